@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import copy
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._progress import Progress
+from assembly._turn import holders, in_turn
 from assembly.errors import InputError
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import pose_rows
@@ -68,7 +68,7 @@ class Assembly(Solving):
         Without an objective the least move is sought; if it is not found, any pose at which all constraints hold is
         returned. A start at which they hold is not moved. If constraints do not hold near the start, other starts are
         tried, the same in every run; the solution with the least objective is returned, and its `restarted` is True.
-        Threads that solve one scene take turns; `solve_many` solves from many starts at once. A callback may solve the
+        Threads that use one scene take turns; `solve_many` solves from many starts at once. A callback may solve the
         scene from elsewhere meanwhile: it is given what a copy of the scene is solved to.
 
         Parameters
@@ -100,10 +100,12 @@ class Assembly(Solving):
         Solution
             Check `success`; if it is False, the status and the message say what happened.
         """
-        with self._turn.lock:
-            if self._turn.is_busy:
+        turn = self._turn
+        # As `in_turn`, which takes as long as a fiftieth of a small scene's warm solve.
+        with turn.lock if not holders else turn.entry() as is_mine:
+            if not is_mine or turn.is_busy:
                 # A callback of a solve of this scene, which reads what it wrote into the packed one until it ends.
-                again = copy(self)
+                again = self._beside(is_mine)
                 return again.solve(q0, starts=starts, time_limit=time_limit, callback=callback, swept=swept, **options)
             is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
             # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
@@ -112,11 +114,13 @@ class Assembly(Solving):
                 if straight is not None:
                     return straight
             interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-            self._turn.is_busy = True
+            before = turn.begin()
+            turn.is_busy = True
             try:
                 return self._solved_in_turn(q0, starts, swept, options, interruption)
             finally:
-                self._turn.is_busy = False
+                turn.is_busy = False
+                turn.end(before)
 
     def _solved_in_turn(
         self,
@@ -143,6 +147,7 @@ class Assembly(Solving):
             _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
         return solution
 
+    @in_turn
     def solve_all(
         self,
         *,
@@ -188,14 +193,13 @@ class Assembly(Solving):
         """
         from assembly.studies.multistart import solve_all
 
-        with self._turn.lock:
-            scene = copy(self) if self._turn.is_busy else self
-            scene._turn.is_busy = True
-            try:
-                return solve_all(scene, starts, seed, Interruption(time_limit), options, executor, progress)
-            finally:
-                scene._turn.is_busy = False
+        self._turn.is_busy = True
+        try:
+            return solve_all(self, starts, seed, Interruption(time_limit), options, executor, progress)
+        finally:
+            self._turn.is_busy = False
 
+    @in_turn
     def solve_many(
         self,
         q0s: ArrayLike | Solution | Sequence[Solution] | None = None,
@@ -244,10 +248,9 @@ class Assembly(Solving):
         """
         from assembly.studies.batches.solving import solve_many
 
-        with self._turn.lock:
-            scene = copy(self) if self._turn.is_busy else self
-            return solve_many(scene, q0s, parameters, of, threads, retry, options)
+        return solve_many(self, q0s, parameters, of, threads, retry, options)
 
+    @in_turn
     def at(self, values: Mapping[str, float]) -> Array:
         """Poses (n, 7) at which joint coordinates have given values, by the names in `Solution.values`: a start `q0`.
 
@@ -278,6 +281,7 @@ class Assembly(Solving):
 
         return Tracker(self, follow, **options)
 
+    @in_turn
     def mobility(
         self,
         q: ArrayLike | Solution | None = None,
@@ -340,6 +344,7 @@ class Assembly(Solving):
             time_limit=time_limit,
         )
 
+    @in_turn
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""
         from assembly.scene_file import save

@@ -48,6 +48,9 @@ Seat = Joint | Sense
 class PackedContents(Contents):
     """Bodies, constraints and terms, and how they are packed; see `Assembly`."""
 
+    # Whether failed solves are not tried from elsewhere: following a branch has to end where the branch does.
+    _stays_near = False
+
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
         self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
@@ -61,6 +64,20 @@ class PackedContents(Contents):
     def __copy__(self) -> Self:
         other = super().__copy__()
         other._turn = Turn()
+        return other
+
+    def _beside(self, is_mine: bool | None) -> Self:
+        """What a thread uses that has no turn while the scene is busy: a copy, that nobody else has.
+
+        Where the turn is this thread's and nobody is amid anything, the process was forked: the scene is packed anew.
+        """
+        if is_mine and not self._turn.holder:
+            self._has_changed()
+            self._turn.is_busy = False
+            return self
+        other = copy(self)
+        # What a solve or a study has set until it ends.
+        other._axes_at, other._turns_near, other._stays_near = None, {}, False
         return other
 
     def _has_changed(self) -> None:
@@ -122,6 +139,7 @@ class PackedContents(Contents):
         if part is None:
             kept = [item for item in self._constraints if has_clearances or not isinstance(item, Clearance)]
             part = type(self)(self._bodies)
+            part._turn = self._turn
             part._take_constraints(kept)
             for sign, objective in self._objectives if has_objectives else ():
                 (part.minimize if sign > 0.0 else part.maximize)(objective)
@@ -146,6 +164,7 @@ class PackedContents(Contents):
             packed.lineage = before.lineage
         if packed is before:
             return packed
+        packed.turn = self._turn
         if packed.number_places is not None and packed.number_places is before.number_places and self._scene:
             # What solutions speak of is the same.
             packed.before, self._packed = before.before, packed
@@ -180,7 +199,7 @@ class PackedContents(Contents):
             self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
         )
         self._scene.axes = {item.name: item.axes for item in constraints if _takes_nearest(item)}
-        packed.before = before
+        packed.before, packed.turn = before, self._turn
         self._packed = packed
 
     def _pack_with_more_places(self) -> Packed:

@@ -45,9 +45,6 @@ AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CO
 class Solving(PackedContents):
     """The solves that `Assembly.solve` is made of; see `Assembly`."""
 
-    # Whether failed solves are not tried from elsewhere: following a branch has to end where the branch does.
-    _stays_near = False
-
     @property
     def _scene_itself(self) -> Assembly:
         """The assembly that this is of: nothing else is made from this class."""

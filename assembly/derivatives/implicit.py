@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._turn import in_turn
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.packing.renumbered import have_same_numbers
@@ -39,6 +41,7 @@ Flags = NDArray[np.bool_]
 SAME = 1e-9
 
 
+@partial(in_turn, calls_back=False)
 def sensitivity(
     scene: Assembly, solution: Solution, of: Measure | Sequence[Measure], wrt: Parameter | Sequence[Parameter]
 ) -> Sensitivity:

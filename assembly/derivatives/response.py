@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from copy import copy
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._turn import Turn, in_turn
 from assembly.derivatives.implicit import sensitivity, several, the_scene
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -154,6 +156,18 @@ class Response:
     def _shaped(self, rows: Array) -> Array:
         return rows[0] if self._is_one else rows
 
+    @property
+    def _turn(self) -> Turn:
+        """That of its scene."""
+        return self._scene._turn
+
+    def _beside(self, is_mine: bool | None) -> Self:
+        """The same of what is used beside the scene."""
+        other = copy(self)
+        other._scene = self._scene._beside(is_mine)
+        return other
+
+    @in_turn
     def _at(self, values: ArrayLike, with_rates: bool) -> tuple[Array, Array]:
         """Measures (m,), and derivatives (m, p) where they are asked for."""
         asked = self._asked(values)

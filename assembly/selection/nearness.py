@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._turn import in_child
 from assembly.distance.bodies.packing import KeptTree, tree_of, tree_of_boundary
 from assembly.distance.bodies.query import bodies_apart
 from assembly.geometry.faces.face import Face, whole_face
@@ -32,6 +33,9 @@ def _point_tree() -> KeptTree:
     """The origin."""
     ends = [0.0, 0.0, 1.0, 1.0]
     return tree_of((whole_face(NurbsSurface(np.zeros((2, 2, 3)), (ends, ends), (1, 1))),))
+
+
+in_child(_point_tree.cache_clear)
 
 
 def finer(breaks: Array, surface: NurbsSurface) -> Array:

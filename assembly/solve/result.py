@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from assembly._named import Named
 from assembly._read_only import ReadOnlyArrays, read_only
+from assembly._turn import Turn
 from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
@@ -117,11 +118,20 @@ class Result(ReadOnlyArrays):
         self._asked = packed.asked
         return self
 
+    @property
+    def _turn(self) -> Turn:
+        """That of its scene, whose packing it shares."""
+        return self._ended.packed.turn
+
     def _list_contacts(self) -> None:
         """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""
-        if self._lists is not None:
-            self._ended = self._lists(self)
-            self._lists = None
+        if self._lists is None:
+            return
+        with self._turn.entry():
+            # Another thread may have listed them meanwhile.
+            if self._lists is not None:
+                self._ended = self._lists(self)
+                self._lists = None
 
     @property
     def _packed(self) -> Packed:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._named import Named
+from assembly._turn import FoundInTurn
 from assembly.constraints.program.records import IMPLICIT
 from assembly.errors import InputError
 from assembly.proximity.extrema.pairs import ContactPair
@@ -100,9 +101,7 @@ class Solution(Result):
         value = self._result(OBJECTIVE)
         if np.isfinite(value) or not self._is_lost:
             return value * self._ended.packed.unit
-        from assembly.solve.diagnosis.lost import goal
-
-        return goal(self)[0]
+        return self._goal[0]
 
     @property
     def feasibility(self) -> float:
@@ -115,53 +114,64 @@ class Solution(Result):
         value = self._result(DUAL)
         if np.isfinite(value) or not self._is_lost:
             return value
-        from assembly.solve.diagnosis.lost import goal
-
-        return goal(self)[1]
+        return self._goal[1]
 
     @property
     def second_order(self) -> SecondOrder | None:
         """What the end of a solve is; judged when it is read, unless the solve had to judge it."""
         if self._order is None and self.success:
-            from assembly.solve.second_order.classification import SecondOrder, judge
-
-            self._order = SecondOrder.NO_OBJECTIVE
-            if self._packed.table[IMPLICIT] == 0:
-                packed = self._packed
-                if self._begun is not None:
-                    # Other solves of the scene may have begun elsewhere since.
-                    packed = packed.twin()
-                    packed.measure_from(self._begun)
-                verdict, model = judge(packed, self._state, sample=False)
-                # Targets may be others by now.
-                judged = model is not None and model.is_stationary
-                self._order = verdict.kind if judged else SecondOrder.UNDECIDED
+            self._order = self._judged
         return self._order
+
+    @FoundInTurn
+    def _judged(self) -> SecondOrder:
+        from assembly.solve.second_order.classification import SecondOrder, judge
+
+        packed = self._packed
+        if packed.table[IMPLICIT] != 0:
+            return SecondOrder.NO_OBJECTIVE
+        if self._begun is not None:
+            # Other solves of the scene may have begun elsewhere since.
+            packed = packed.twin()
+            packed.measure_from(self._begun)
+        verdict, model = judge(packed, self._state, sample=False)
+        # Targets may be others by now.
+        judged = model is not None and model.is_stationary
+        return verdict.kind if judged else SecondOrder.UNDECIDED
+
+    @FoundInTurn
+    def _goal(self) -> tuple[float, float]:
+        """Of a lost contact: the objective and the largest component of its gradient."""
+        from assembly.solve.diagnosis.lost import goal
+
+        return goal(self)
 
     @cached_property
     def violations(self) -> dict[str, float]:
         """The largest violation of every constraint, by name; lengths in the user's unit, angles in radians."""
-        if self._is_lost:
-            from assembly.solve.diagnosis.lost import violations
+        return self._lost_violations if self._is_lost else self._largest(1.0)
 
-            return Named(violations(self))
-        return self._largest(1.0)
+    @FoundInTurn
+    def _lost_violations(self) -> dict[str, float]:
+        from assembly.solve.diagnosis.lost import violations
 
-    @cached_property
+        return Named(violations(self))
+
+    @FoundInTurn
     def wrenches(self) -> dict[str, dict[str, Wrench]]:
         """What every constraint exerts on each of its bodies, by their names."""
         from assembly.solve.forces.statics import wrenches
 
         return Named(wrenches(self))
 
-    @cached_property
+    @FoundInTurn
     def mobility(self) -> Mobility:
         """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
         from assembly.solve.diagnosis.mobility import Mobility
 
         return Mobility.at(self._scene, self._packed, self._state, solved=True, fit=self._allowed)
 
-    @cached_property
+    @FoundInTurn
     def conflicting_sets(self) -> list[tuple[str, ...]]:
         """Disjoint minimal sets of constraints that cannot hold together; [] where the status is not INFEASIBLE.
 
@@ -178,7 +188,7 @@ class Solution(Result):
         """Names in `conflicting_sets`, sorted, each once."""
         return sorted({name for names in self.conflicting_sets for name in names})
 
-    @cached_property
+    @FoundInTurn
     def contacts(self) -> dict[str, ContactPair]:
         """The extremal pair of every contact at `q`, found again from the loop's parameters."""
         from assembly.solve.contact_pairs import contact_pairs
@@ -224,7 +234,7 @@ class Solution(Result):
         choose = joined_pairs if joined else free_pairs
         return crossings_of(self, choose(self._scene.bodies, self._scene.constraints), asked)
 
-    @cached_property
+    @FoundInTurn
     def pose_error(self) -> float:
         """About how far `q` is from where all rows hold exactly, by their residuals: in sizes of the scene and radians.
 

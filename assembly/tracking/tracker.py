@@ -141,11 +141,13 @@ class Tracker(Ticks):
         self._scene_given = scene
         self._keep_contents()
         self._touching = touching
-        poses = _begin(scene, q0, touching)
-        self._hands = new_hands(scene, follow, poses, weights)
-        self._inner = inner = with_hands(scene, self._hands)
-        # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
-        first = _held_to(inner.solve(poses, touching=touching))
+        # What is begun with has the numbers that the scene has then; what is solved of it takes its turn again.
+        with scene._turn.entry():
+            poses = _begin(scene, q0, touching)
+            self._hands = new_hands(scene, follow, poses, weights)
+            self._inner = inner = with_hands(scene, self._hands)
+            # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
+            first = _held_to(inner.solve(poses, touching=touching))
         if first.disagreeing:
             # What rows disagree by depends on the pose.
             limit = max(limit, Options.fit)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import place_of, rows_of
+from assembly._turn import Turn
 from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.packing import manager as manager_packing
@@ -103,6 +104,8 @@ class Packed(WrittenScene):
     is_loop_alone : bool
         Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives. What has
         no extent may have outgrown its size; corners are tried first; clearances are looked after.
+    turn : Turn
+        That of the scene, for those that have a solution alone; twins have the same.
     before : Packed or None
         The same scene as it was packed before it had this size, or these rows of clearances.
     lineage : object
@@ -125,7 +128,7 @@ class Packed(WrittenScene):
         size: float | None = None,
     ) -> None:
         self.count = len(bodies)
-        self.numbers, self.lineage = numbers_set(), object()
+        self.numbers, self.lineage, self.turn = numbers_set(), object(), Turn()
         self.stamp = structure_changes()
         self.structure = structure_of(constraints)
         measured, self._has_no_extent = size_and_extent(bodies, constraints, objectives)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import place_of, size_of
+from assembly._turn import in_child
 from assembly.distance.bodies.boundary_patches import boundary_patches
 from assembly.distance.bodies.elementary import spine_row
 from assembly.distance.bodies.nodes import plant_tree
@@ -112,6 +113,11 @@ def tree_of_boundary(face: Face, curve: int) -> KeptTree:
     center, half = _box_of((face,))
     blocks = boundary_patches(face, patches_of(face, 0, center), curve)
     return _planted((face,), list(blocks), center, half)
+
+
+# Other threads may be amid searches that make nodes of them.
+in_child(tree_of.cache_clear)
+in_child(tree_of_boundary.cache_clear)
 
 
 def _box_of(faces: Sequence[Face]) -> tuple[Array, Array]:

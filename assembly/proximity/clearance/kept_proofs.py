@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock
 
+from assembly._turn import in_child
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.proof import ClearanceProof
 
@@ -21,6 +22,14 @@ Key = tuple[tuple[tuple[Face, ...], ...], tuple[tuple[int, int], ...], tuple[flo
 MOST = 64
 _kept: OrderedDict[Key, ClearanceProof] = OrderedDict()
 _lock = Lock()
+
+
+def _begin_in_child() -> None:
+    global _lock
+    _lock = Lock()
+
+
+in_child(_begin_in_child)
 
 
 @contextmanager

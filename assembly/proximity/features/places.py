@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._turn import in_child
 from assembly.distance.bodies.packing import KeptTree, tree_of
 from assembly.distance.bodies.query import Spot, place_of_spot
 from assembly.errors import InputError
@@ -31,6 +32,9 @@ def body_faces(faces: Faces) -> Faces:
 def body_tree(faces: Faces) -> KeptTree:
     """The tree of a body."""
     return tree_of(body_faces(faces))
+
+
+in_child(body_tree.cache_clear)
 
 
 @lru_cache(maxsize=256)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays
+from assembly._turn import FoundInTurn, Turn
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import integer, positive
 from assembly.solve.dense.groups import Group, groups_of
@@ -150,6 +151,11 @@ class Mobility(ReadOnlyArrays):
             _time_limit=time_limit,
         )
 
+    @property
+    def _turn(self) -> Turn:
+        """That of the scene."""
+        return self._snapshot.turn
+
     @cached_property
     def redundant_sets(self) -> list[tuple[str, ...]]:
         """Sets of constraints the last of which asks, in part or wholly, what the others ask already.
@@ -169,7 +175,7 @@ class Mobility(ReadOnlyArrays):
         """Names in `redundant_sets`, sorted, each once."""
         return sorted({name for names in self.redundant_sets for name in names})
 
-    @cached_property
+    @FoundInTurn
     def conflicting_sets(self) -> list[tuple[str, ...]]:
         """Disjoint minimal sets of constraints that cannot hold together near the pose; [] where all can.
 
@@ -187,7 +193,7 @@ class Mobility(ReadOnlyArrays):
     def _names(self, places: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._scene.constraints[k].name for k in places)
 
-    @cached_property
+    @FoundInTurn
     def finite_dof(self) -> int:
         """Degrees of freedom of the poses nearby: the least that was found a small way along the free motions.
 
@@ -205,7 +211,7 @@ class Mobility(ReadOnlyArrays):
         """Whether the pose has more degrees of freedom than poses nearby: `finite_dof < dof`."""
         return self.finite_dof < self.dof
 
-    @cached_property
+    @FoundInTurn
     def _problem(self) -> Problem:
         return self._snapshot.problem(one_sided=False, drives=self._drives)
 

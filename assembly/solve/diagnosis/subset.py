@@ -163,7 +163,7 @@ class Snapshot:
     def __init__(
         self, scene: Scene, packed: Packed, state: Array, rows: Rows | None, solved: bool, held: float = HELD
     ) -> None:
-        self.scene = scene
+        self.scene, self.turn = scene, packed.turn
         self._held = held
         self.q = state[: packed.contacts_at].reshape(-1, 7)
         self.spread = Spread.of(packed, self.q)

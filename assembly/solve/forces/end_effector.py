@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._turn import in_turn
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.dexterity import MEASURES, Axes, Dexterity, Task
 from assembly.constraints.model.joint import Joint
@@ -44,6 +45,7 @@ Array = NDArray[np.float64]
 TOUCHING = 1e-8
 
 
+@in_turn
 def tip_jacobian(
     scene: Assembly,
     tip: Point | Frame | Body,
@@ -105,6 +107,7 @@ def tip_jacobian(
     return _evaluated(scene, options, q, active)[0]
 
 
+@in_turn
 def dexterity_value(
     scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | None = None, *, active: bool = False
 ) -> float:
@@ -132,6 +135,7 @@ def dexterity_value(
     return value
 
 
+@in_turn
 def dexterity_ellipsoid(
     scene: Assembly,
     tip: Point | Frame | Body,

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
+from assembly._turn import in_turn
 from assembly.constraints.model.constraint import Coordinate
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
@@ -338,6 +339,7 @@ def _built(scene: Assembly, packed: Packed, ipopt: tuple[tuple[str, Any], ...]) 
     return ReferenceSolver(scene, dict(ipopt))
 
 
+@in_turn
 def solve(
     scene: Assembly,
     q0: ArrayLike | Solution | None = None,

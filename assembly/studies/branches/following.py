@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from assembly._turn import in_turn
 from assembly.derivatives.implicit import check_is_of, several, the_scene
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import ControlPoint, ControlWeight, LeastGap, ShapeNumber
@@ -33,6 +34,7 @@ __all__ = ["follow"]
 OF_FACES = (ControlPoint, ControlWeight, LeastGap, ShapeNumber)
 
 
+@in_turn
 def follow(
     scene: Assembly,
     parameter: Parameter,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Coordinate
 from assembly.constraints.model.objectives import Objective, Posture
@@ -58,6 +59,7 @@ _ASIDE, _DIRECTIONS = 0.03, 1
 _NEAR, _TURNED = 2.0, 4.0 * pi
 
 
+@in_turn
 def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
     """The range of a measure over all poses that one-sided contacts, clearances and limits allow.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._progress import Progress, checked_progress, watched
+from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.errors import InputError, integer, items, positive, vector
 from assembly.kinematics.body import Body
@@ -93,7 +94,7 @@ def workspace(
     grid = grid_of(plane, first.pose(point.body).apply(point.coordinates), size)
     region = _Region(grid, within)
     drawn = DrawnTip(scene, point, grid)
-    flood = Flood(grid, drawn, 0.5 * scene.packed().scale, flips, most)
+    flood = Flood(grid, drawn, 0.5 * _size(scene), flips, most)
     others = items("starts", starts, "poses or solutions")
     with watched(progress, "workspace", 0, "solve") as flood.advance:
         for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
@@ -123,6 +124,11 @@ def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
         _stops=tuple(limit[3] for limit in limits),
         _drawn=flood.tip,
     )
+
+
+@in_turn
+def _size(scene: Assembly) -> float:
+    return scene.packed().scale
 
 
 def _point(scene: Assembly, tip: Point | Frame | Body) -> Point:

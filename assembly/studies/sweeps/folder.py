@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.studies.sweeps.chain import Start
@@ -25,6 +25,7 @@ from assembly.studies.sweeps.work import ChunkDone, Rows
 
 __all__ = ["Folder"]
 
+Array = NDArray[np.float64]
 MANIFEST, LOCK, PART, UNFINISHED = "manifest.json", "lock", "part-", "unfinished-"
 
 
@@ -115,11 +116,10 @@ class Folder:
 
     def _put(self, name: str, text: str) -> None:
         """Write a file so that it is there as a whole or not at all."""
-        with tempfile.NamedTemporaryFile(
-            "w", dir=self.path, prefix=UNFINISHED, delete=False, encoding="utf-8", newline="\n"
-        ) as file:
-            file.write(text)
-        os.replace(file.name, self.path / name)
+        # Nobody else writes here.
+        place = self.path / f"{UNFINISHED}{name}"
+        place.write_bytes(text.encode())
+        os.replace(place, self.path / name)
 
     def _part(self, path: Path, table: Table) -> ChunkDone | None:
         """The runs of a part that are not done yet; None of one that is damaged."""
@@ -152,18 +152,18 @@ class Folder:
 
 def _lines(done: ChunkDone, table: Table) -> list[str]:
     """A line of JSON for each row of a chunk, written by hand: most of it is the same in all of them."""
-    rows = table.rows(done.runs).tolist()
-    runs = np.repeat(done.runs, [len(table.runs[number].rows) for number in done.runs]).tolist()
-    heads = [f'"status": {json.dumps(name)}, "iterations": ' for name in done.names]
-    measures = done.values.tolist()
-    if not np.isfinite(done.values).all():
-        measures = [json.dumps([x if math.isfinite(x) else None for x in row]) for row in measures]
-    lines = [
-        f'{{"row": {row}, "run": {run}, {heads[name]}{iterations}, "measures": {values}}}'
-        for row, run, name, iterations, values in zip(
-            rows, runs, done.status.tolist(), done.iterations.tolist(), measures, strict=True
-        )
-    ]
+    measures = _measures(done.values)
+    kinds = list(zip(done.status.tolist(), done.iterations.tolist(), strict=True))
+    names = list(map(json.dumps, done.names))
+    heads = {kind: f'"status": {names[kind[0]]}, "iterations": {kind[1]}, "measures": [' for kind in set(kinds)}
+    lines: list[str] = []
+    for number in done.runs:
+        rows = table.runs[number].rows.tolist()
+        run, own = f', "run": {number}, ', slice(len(lines), len(lines) + len(rows))
+        lines += [
+            f'{{"row": {row}{run}{heads[kind]}{told}]}}'
+            for row, kind, told in zip(rows, kinds[own], measures[own], strict=True)
+        ]
     for k, message in done.messages.items():
         lines[k] = f'{lines[k][:-1]}, "message": {json.dumps(message)}}}'
     at = 0
@@ -173,6 +173,15 @@ def _lines(done: ChunkDone, table: Table) -> list[str]:
             lines[k] = f'{lines[k][:-1]}, "start": {json.dumps(place)}}}'
         at += len(table.runs[number].rows)
     return lines
+
+
+def _measures(values: Array) -> list[str]:
+    """The measures (k, m) of each row, with commas; null for those that are not finite."""
+    told = list(map(repr, values.ravel().tolist()))
+    for k in np.flatnonzero(~np.isfinite(values)):
+        told[k] = "null"
+    count = values.shape[1]
+    return told if count == 1 else [", ".join(told[k * count : (k + 1) * count]) for k in range(len(values))]
 
 
 def _locked(path: Path) -> IO[str]:

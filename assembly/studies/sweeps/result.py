@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
+from assembly._turn import in_turn
 from assembly.errors import InputError, integer, items
 from assembly.solve.solution import Solution
 from assembly.studies.sweeps.fronts import not_dominated
@@ -21,6 +22,8 @@ from assembly.studies.sweeps.work import Job, Worker
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from assembly.assembly import Assembly
 
 __all__ = ["Study"]
 
@@ -125,13 +128,7 @@ class Study(ReadOnlyArrays):
         k = integer("row", row, 0, len(self) - 1)
         if not self.success[k]:
             raise InputError(f"row {k} is {self.table['status'][k]}; expected one that has a solution")
-        from assembly.derivatives.response import values_set
-
-        parameters = self._job.parameters
-        with values_set(parameters, [parameter.value for parameter in parameters]):
-            told = Worker(self._job).solution(self._rows.chunk([self._rows.run_of(k)]), k)
-        assert told.solution is not None
-        return told.solution
+        return _solved_again(self._job.scene, self._job, self._rows, k)
 
     def to_pandas(self) -> Any:
         """The table as a `pandas.DataFrame`, its index the row.
@@ -226,6 +223,17 @@ class Study(ReadOnlyArrays):
     def _check_measure(self, argument: str, name: Any) -> None:
         if name not in self.measures:
             raise InputError(f"{argument} is {name!r}; expected one of {', '.join(map(repr, self.measures))}")
+
+
+@in_turn
+def _solved_again(_: Assembly, job: Job, rows: Table, k: int) -> Solution:
+    """The solution of a row of a study of a scene, whose numbers are others meanwhile."""
+    from assembly.derivatives.response import values_set
+
+    with values_set(job.parameters, [parameter.value for parameter in job.parameters]):
+        told = Worker(job).solution(rows.chunk([rows.run_of(k)]), k)
+    assert told.solution is not None
+    return told.solution
 
 
 def _names(argument: str, given: str | Sequence[str]) -> tuple[str, ...]:

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from contextlib import closing, nullcontext
+from functools import partial
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from assembly._progress import Progress, checked_progress, watched
+from assembly._progress import Advance, Progress, checked_progress, watched
+from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import check_is_of, the_scene
+from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import RowNumber, TargetNumber
 from assembly.derivatives.response import values_set
 from assembly.errors import InputError, positive
 from assembly.studies.sweeps.folder import Folder
 from assembly.studies.sweeps.identity import manifest_of
-from assembly.studies.sweeps.measuring import columns_of
+from assembly.studies.sweeps.measuring import Column, columns_of
 from assembly.studies.sweeps.plans import Plan, as_plan
 from assembly.studies.sweeps.result import Study, new_study
-from assembly.studies.sweeps.scheduling import Executor, StudyError, in_process, on_executor
+from assembly.studies.sweeps.scheduling import Executor, StudyError, Take, in_process, on_executor, sent
 from assembly.studies.sweeps.table import Table
 from assembly.studies.sweeps.work import ChunkDone, Job
 
 __all__ = ["study"]
 
 _LOG = logging.getLogger("assembly.studies")
+Compute = Callable[[Take, Advance], None]
 # Columns that every table has.
 OWN = ("row", "status", "message", "iterations")
 
@@ -80,10 +85,52 @@ def study(
         Workers run kernels of different processors.
     """
     the_scene(scene)
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise TypeError(f"executor is {executor!r}; expected an Executor with submit, or a client of Dask")
+    checked_progress(progress)
+    seconds = positive("chunk_seconds", chunk_seconds)
+    columns = columns_of(of)
+    if executor is None:
+        calls_back = callable(progress) or not all(isinstance(column.of, Measure) for column in columns)
+        return in_turn(_here, calls_back)(scene, (plan, columns, folder, swept), progress, seconds)
+    asked = _asked(scene, plan, columns, folder, swept)
+
+    def on_workers(take: Take, _: Advance) -> None:
+        # Workers have scenes of their own, and other threads the turn of this one.
+        on_executor(sent(scene, asked.job), asked.table, seconds, take, executor)
+
+    return _found(asked, on_workers, progress, is_told=True)
+
+
+class _Asked(NamedTuple):
+    """What a study is asked for: its job, its rows, its plan, and where finished parts are kept."""
+
+    job: Job
+    table: Table
+    designs: Plan
+    kept: Folder | None
+
+
+def _here(scene: Assembly, given: tuple[Any, ...], progress: Progress, seconds: float) -> Study:
+    """A study in this process, which has the scene's turn until it ends: its numbers are those of rows meanwhile."""
+    asked: _Asked = _asked(scene, *given)
+    parameters = asked.designs.parameters
+
+    def in_this_process(take: Take, say: Advance) -> None:
+        in_process(asked.job, asked.table, seconds, take, say)
+
+    with values_set(parameters, np.array([parameter.value for parameter in parameters])):
+        return _found(asked, in_this_process, progress, is_told=False)
+
+
+@partial(in_turn, calls_back=False)
+def _asked(
+    scene: Assembly, plan: Any, columns: tuple[Column, ...], folder: str | PathLike[str] | None, swept: bool
+) -> _Asked:
+    """What the arguments of `study` ask for."""
     designs = as_plan(plan)
     for parameter in designs.parameters:
         check_is_of("plan", scene, parameter)
-    columns = columns_of(of)
     names = [*OWN, *designs.names]
     for column in columns:
         if column.name in names:
@@ -93,18 +140,11 @@ def study(
     for name in designs.names:
         if name in OWN:
             raise InputError(f"plan has a parameter of the name {name!r}, as every table; expected another one: name=")
-    if executor is not None and not callable(getattr(executor, "submit", None)):
-        raise TypeError(f"executor is {executor!r}; expected an Executor with submit, or a client of Dask")
-    checked_progress(progress)
     _check_swept(scene, designs, swept)
-    seconds = positive("chunk_seconds", chunk_seconds)
     job = Job(scene, designs.parameters, columns, designs.seed if designs.kind == "starts" else None, swept)
     table = Table(designs.values, designs.runs(), len(columns))
-    before = np.array([parameter.value for parameter in designs.parameters])
     kept = None if folder is None else Folder(folder, manifest_of(scene, designs, columns, swept))
-    with closing(kept) if kept is not None else nullcontext(), values_set(designs.parameters, before):
-        kernels = _computed(job, table, kept, executor, progress, seconds)
-    return new_study(table, designs, job, kernels)
+    return _Asked(job, table, designs, kept)
 
 
 def _check_swept(scene: Assembly, designs: Plan, swept: bool) -> None:
@@ -125,9 +165,15 @@ def _check_swept(scene: Assembly, designs: Plan, swept: bool) -> None:
             )
 
 
-def _computed(
-    job: Job, table: Table, kept: Folder | None, executor: Executor | None, progress: Progress, seconds: float
-) -> str:
+def _found(asked: _Asked, compute: Compute, progress: Progress, is_told: bool) -> Study:
+    """What is found where `compute` computes what is left; `is_told` whether chunks are told as they come."""
+    kept = asked.kept
+    with closing(kept) if kept is not None else nullcontext():
+        kernels = _computed(asked.table, kept, compute, progress, is_told)
+    return new_study(asked.table, asked.designs, asked.job, kernels)
+
+
+def _computed(table: Table, kept: Folder | None, compute: Compute, progress: Progress, is_told: bool) -> str:
     """Fill the table; the processor of the kernels that did."""
     if kept is not None:
         kept.read(table)
@@ -152,13 +198,10 @@ def _computed(
                 kept.write(done, table)
             solved = len(done.status)
             _LOG.debug("a chunk of %d runs, %d rows, took %.3f s", len(done.runs), solved, done.seconds)
-            return True if executor is None else advance(solved)
+            return advance(solved) if is_told else True
 
         try:
-            if executor is None:
-                in_process(job, table, seconds, take, advance)
-            else:
-                on_executor(job, table, seconds, take, executor)
+            compute(take, advance)
         except KeyboardInterrupt:
             _LOG.warning("the study was interrupted with %d of %d rows done", count - table.rows_left, count)
     return kernels

@@ -11,14 +11,18 @@ import pickle
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from queue import SimpleQueue
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
+from assembly._turn import in_turn
 from assembly.errors import AssemblyError, InputError
 from assembly.studies.sweeps.table import Table
 from assembly.studies.sweeps.task import Parcel, compute
 from assembly.studies.sweeps.work import ChunkDone, Job, Worker
 
-__all__ = ["Executor", "StudyError", "Waiting", "in_process", "on_executor"]
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["Executor", "Take", "StudyError", "Waiting", "in_process", "on_executor", "sent"]
 
 # What a row is taken to take before any is measured, in seconds.
 FIRST_GUESS = 1e-3
@@ -72,7 +76,8 @@ class Waiting:
     def chunk(self) -> list[int]:
         """The next runs: for so many seconds, or less near the end, down to a tenth of them."""
         a_row = self._spent / self._solved if self._solved else FIRST_GUESS
-        share = a_row * self._left / (SHARES * self._workers)
+        # A single worker has nobody to end together with.
+        share = a_row * self._left / (SHARES * self._workers if self._workers > 1 else 1)
         least = LEAST_PART * self._seconds
         most = max(min(self._seconds, share), least) / a_row
         if self._at_hand < self._left:
@@ -108,9 +113,8 @@ def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable
         waiting.took(done)
 
 
-def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Executor) -> None:
-    """Compute a study on workers. What they have not begun is called off where it ends early."""
-    packed = Parcel(_pickled(job))
+def on_executor(packed: Parcel, table: Table, seconds: float, take: Take, executor: Executor) -> None:
+    """Compute a study on workers, who are sent a packed job. What they have not begun is called off where it ends."""
     workers = _workers_of(executor)
     waiting = Waiting(table, seconds, workers)
     answers: SimpleQueue[Any] = SimpleQueue()
@@ -142,8 +146,13 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
             future.cancel()
 
 
+@in_turn
+def sent(_: Assembly, job: Job) -> Parcel:
+    """What workers are sent with every chunk of a study of a scene."""
+    return Parcel(_pickled(job))
+
+
 def _pickled(job: Job) -> bytes:
-    """What workers are sent once a chunk."""
     try:
         return pickle.dumps(job)
     except Exception as error:

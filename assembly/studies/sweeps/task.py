@@ -10,6 +10,8 @@ import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
+from assembly._turn import in_child
+
 if TYPE_CHECKING:
     from assembly.studies.sweeps.work import ChunkDone
 
@@ -21,6 +23,16 @@ MOST_KNOWN = 2
 # Threads take turns: what was set anew is counted for the process (`kinematics/changes.py`), and most of a row is
 # Python.
 _turn = threading.RLock()
+
+
+def _begin_in_child() -> None:
+    global _turn
+    _turn = threading.RLock()
+    # Another thread may have been amid a chunk of one of them.
+    _known.clear()
+
+
+in_child(_begin_in_child)
 
 
 class Parcel:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -34,6 +35,7 @@ Array = NDArray[np.float64]
 _SAME = 1e-8
 
 
+@in_turn
 def synthesize(
     scene: Assembly,
     minimize: Measure | Relation | Station | Sequence[Station],

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._progress import Advance, Progress, checked_progress, watched
+from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import sensitivity, several
 from assembly.derivatives.measure import Measure
@@ -37,6 +38,7 @@ __all__ = ["tolerances"]
 Array = NDArray[np.float64]
 
 
+@in_turn
 def tolerances(
     scene: Assembly,
     solution: Solution,

@@ -86,6 +86,18 @@ def test_failures_and_messages_are_kept(tmp_path):
     assert (again.solution(2).q == first.solution(2).q).all()
 
 
+def test_a_line_has_all_measures_of_a_row_and_null_for_no_number(tmp_path):
+    scene, (angle, crank, _), out = four_bar()
+    plan = asm.rows({angle: [0.7, 0.7, 0.75], crank: [1.5, 12.0, 1.5]})
+    found = asm.study(scene, plan, {"out": out, "twice": lambda s: 2.0 * out.value(s)}, folder=tmp_path)
+    (part,) = tmp_path.glob("part-*.jsonl")
+    lines = [json.loads(line) for line in part.read_text().splitlines()[1:-1]]
+    told = [[found["out"][k], found["twice"][k]] for k in (0, 2)]
+    assert [line["measures"] for line in lines] == [told[0], [None, None], told[1]]
+    assert [line["status"] for line in lines] == found.table["status"].tolist()
+    assert [line["iterations"] for line in lines] == found.table["iterations"].tolist()
+
+
 @pytest.mark.skipif(os.name == "nt", reason="there are no forks on this system")
 def test_killed_at_any_moment(tmp_path, cases):
     from tests.studies.sweeps.killed_study import go_on  # which solves when it is imported

@@ -81,10 +81,12 @@ class Elsewhere:
         return future
 
 
-def calls_of(rows, folder):
-    """How many functions a process calls that hands out a study."""
-    scene, (angle, *_), out = four_bar()
+def calls_of(rows, folder=None, executor=None, of_length=False):
+    """How many functions a process calls that hands out a study, or solves its rows."""
+    scene, (angle, length, _), out = four_bar()
     plan = asm.grid({angle: np.linspace(0.7, 1.7, rows)})
+    if of_length:
+        plan = asm.grid({length: length.value * np.linspace(0.99, 1.01, rows)})
     count = 0
 
     def one_more(_frame, event, _argument):
@@ -93,7 +95,7 @@ def calls_of(rows, folder):
 
     sys.setprofile(one_more)
     try:
-        found = asm.study(scene, plan, out, executor=Elsewhere(), folder=folder, chunk_seconds=1e6)
+        found = asm.study(scene, plan, out, executor=executor, folder=folder, chunk_seconds=1e6)
     finally:
         sys.setprofile(None)
     assert found.success.all()
@@ -103,9 +105,21 @@ def calls_of(rows, folder):
 @pytest.mark.parametrize(("kept", "most"), [(False, 0.75), (True, 1.2)], ids=["kept nowhere", "in a folder"])
 def test_a_row_costs_hardly_anything_where_it_is_handed_out(kept, most, tmp_path):
     # The first one loads what it needs.
-    _, few, many = (calls_of(rows, tmp_path / str(rows) if kept else None) for rows in (40, 1000, 3000))
-    # 0.65 and 1.08 calls, of runs and coarse rows; solving and measuring a row takes some 160.
+    _, few, many = (calls_of(rows, tmp_path / str(rows) if kept else None, Elsewhere()) for rows in (40, 1000, 3000))
+    # 0.65 and 1.14 calls, of runs and coarse rows; solving and measuring a row takes some 160.
     assert (many - few) / 2000 < most
+
+
+def test_a_row_with_another_length_lends_what_changed():
+    # Table and pool of the twin with its numbers. It was 185 where all arrays were lent anew, at 1 to 2 us an array.
+    _, few, many = (calls_of(rows, of_length=True) for rows in (40, 200, 600))
+    assert (many - few) / 400 < 165
+
+
+def test_a_single_worker_gets_chunks_of_the_requested_time():
+    _, chunks = simulated(150_000, (1,))
+    # Of half a second but for the first ones; with shares for others to end together with there were 26.
+    assert chunks <= 19
 
 
 def test_what_workers_are_sent_has_a_name_by_its_content():
