@@ -63,15 +63,13 @@ def closing_rates(contacts: ContactRows, here: Array, there: Array) -> Array:
         In the unit of the scene.
     """
     rates = np.empty(len(contacts.pairs))
-    screws: dict[tuple[int, int], tuple[Array, Array]] = {}
-    for k, (a, b) in enumerate(contacts.bodies.tolist()):
-        first = rotation_matrix(here[a, 3:])
-        if (a, b) not in screws:
-            turned, second = rotation_matrix(there[a, 3:]), rotation_matrix(here[b, 3:])
-            rotation = turned.T @ rotation_matrix(there[b, 3:]) @ second.T @ first
-            before, after = first.T @ (here[b, :3] - here[a, :3]), turned.T @ (there[b, :3] - there[a, :3])
-            screws[a, b] = screw_between(rotation, after - rotation @ before)
-        v, w = screws[a, b]
-        normal, point = first.T @ contacts.normals[k], first.T @ (contacts.points[k, 1] - here[a, :3])
-        rates[k] = normal @ (v + np.cross(w, point))
+    for a, b in set(map(tuple, contacts.bodies.tolist())):
+        first, second = rotation_matrix(here[a, 3:]), rotation_matrix(here[b, 3:])
+        turned = rotation_matrix(there[a, 3:])
+        rotation = turned.T @ rotation_matrix(there[b, 3:]) @ second.T @ first
+        before, after = first.T @ (here[b, :3] - here[a, :3]), turned.T @ (there[b, :3] - there[a, :3])
+        v, w = screw_between(rotation, after - rotation @ before)
+        rows = (contacts.bodies == (a, b)).all(axis=1)
+        normals, points = contacts.normals[rows] @ first, (contacts.points[rows, 1] - here[a, :3]) @ first
+        rates[rows] = (normals * (v + np.cross(w, points))).sum(axis=1)
     return rates

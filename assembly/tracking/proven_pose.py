@@ -88,7 +88,8 @@ class ProvenPose:
             proof.fronts.counts.budget = BUDGET
         proof.forget_poses()
         # Wires are in each other by the distance of their spines, which no move has to open.
-        proof.make_slimmer(0.0 if limits.of_pushed and limits.depth < np.inf else touching)
+        self._slimmer = 0.0 if limits.of_pushed and limits.depth < np.inf else touching
+        proof.make_slimmer(self._slimmer)
         self.proof, self._has_wires = proof, proof.has_wires
         self._judge: ClearanceProof | None = None
         pairs = first._packed.kept_pairs[: len(proof.pairs)]
@@ -106,6 +107,7 @@ class ProvenPose:
         """A second proof, which tells of poses alone: the first one goes on from the last pose."""
         if self._judge is None:
             self._judge = new_proof(self.at.packed, self.at.scene.bodies)
+            self._judge.make_slimmer(self._slimmer)
             self._judge.until = self.proof.until
         return self._judge
 

@@ -7,6 +7,9 @@ A pair of bodies is tried by what costs least first, and only what is not proven
 3. the way of bodies that are opened farther at both poses, by parts of what a contact that rolls may go in;
 4. the straight way, with many pairs of nodes.
 
+To a pose at which bodies are not proven to be clear no way leads, and to seek one takes a budget at each of its parts.
+So where 1 and 2 fail, a second proof looks at the end of a way before the way is tried.
+
 The procedure is a generator. It yields where the time is over, and goes on where it was when it is resumed.
 """
 
@@ -87,10 +90,12 @@ class TickProof:
             self._left = [*self._open_yet(range(len(proof.pairs)), rolling), *rolling]
         yield from self._open_contacts(rolling)
         if not (yield from self._get_rows()):
-            for part in OPENED:
-                yield from self._roll([k for k in self._open_yet(self._left) if last.may_go_in(k, there, part)], part)
+            yield from self._roll(self._open_yet(self._left), OPENED[0])
+            clear = yield from self._clear_at(self._open_yet(self._left), self._moves)
+            for part in OPENED[1:]:
+                yield from self._roll(self._open_yet(clear), part)
             # What is much, and not deep: it takes more where bodies touch, which are opened in less.
-            yield from self._go_straight(self._open_yet(self._left), BUDGET)
+            yield from self._go_straight(self._open_yet(clear), BUDGET)
             self.doubtful = last.not_known(self._answers, there)
             self.in_the_way = list(self.doubtful)
         if self.doubtful:
@@ -151,10 +156,11 @@ class TickProof:
         return bool(refused)
 
     def _roll(self, which: Sequence[int], part: float) -> Generator[None, None, None]:
-        """Look at some pairs that are opened on the way, by a part of what it may go in."""
+        """Look at those of some pairs that may go in by a part of what the way does, opened on the way by as much."""
+        last, there, proof, touching = self._last, self._there, self._last.proof, self._last.touching
+        which = [k for k in which if last.may_go_in(k, there, part)]
         if not which:
             return
-        last, there, proof, touching = self._last, self._there, self._last.proof, self._last.touching
         before, after = last.moves.copy(), self._moves.copy()
         for k in which:
             depth = last.roll_depth(k, there, part)
@@ -164,15 +170,25 @@ class TickProof:
                 if move.any():
                     opened[k] = move
                 yield from self._pause()
-        opened_at = yield from proof.looking(last.at.q, touching, before, which=which, swept=True)
-        known = [k for k, answer in zip(which, opened_at, strict=True) if is_proven(answer)]
-        if known:
-            ways = yield from proof.looking(there.q, touching, after, which=known, swept=True)
-            known = [k for k, answer in zip(known, ways, strict=True) if is_proven(answer)]
+        known = yield from self._clear_at(which, after)
+        answers: dict[int, Answer] = {}
         # Where the way is not known, a pose at its end that is clear is none that was come to.
-        ends = yield from proof.looking(there.q, touching, self._moves, which=which, swept=True)
-        for k, answer in zip(which, ends, strict=True):
-            self._answers[k] = answer if k in known or not is_proven(answer) else UNKNOWN
+        for q, moves in ((last.at.q, before), (there.q, after), (there.q, self._moves)):
+            found = yield from proof.looking(q, touching, moves, which=known, swept=True)
+            answers = {k: answer for k, answer in zip(known, found, strict=True) if is_proven(answer)}
+            known = list(answers)
+        self._answers |= dict.fromkeys(which, UNKNOWN) | answers
+
+    def _clear_at(self, which: Sequence[int], moves: Array) -> Generator[None, None, list[int]]:
+        """Those of some pairs that are clear at the pose of the tick after moves (pairs, 6)."""
+        if not which:
+            return []
+        q, touching = self._there.q, self._last.touching
+        found = yield from self._last.judge.looking(q, touching, moves, which=which, budget=BUDGET)
+        answers = dict(zip(which, found, strict=True))
+        clear = [k for k in which if is_proven(answers[k])]
+        self._answers |= {k: answers[k] for k in which if k not in clear}
+        return clear
 
     def _close_wires(self) -> Generator[None, None, None]:
         """Go on without moves that open pairs of wires, where these are proven to touch without."""

@@ -28,8 +28,8 @@ from assembly.proximity.clearance.front import (
 )
 from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.records import (
+    BY_BORE_B,
     BY_PLANE,
-    BY_SLEEVE,
     BY_SPINES,
     CLEAR,
     CROSSING,
@@ -94,7 +94,7 @@ def part_nodes(forest, front, way, nodes, hint, needed):
         if stays_apart(forest, inside, way, n, (at_start, room - needed)):
             keep(front, inside, n, expiry_of(inside, travelled, room - needed))
             return ARE_PARTED, n, gaps, overlap
-        if how >= BY_SLEEVE and at_start > 0.0:
+        if at_start > 0.0 and is_round(forest, nodes.a if how == BY_BORE_B else nodes.b):
             # Round nodes are exact: smaller nodes prove no more.
             return NEED_SHORTER, n, gaps, overlap
     return NOT_PARTED, n, gaps, overlap
@@ -310,6 +310,9 @@ def go_to(forest, front, pose, limits):
             step *= 2.0
         else:
             step *= 0.5
+            while done + step >= to:
+                # As far as what has just failed.
+                step *= 0.5
     pair.part = 1.0 if done == 1.0 else behind + (1.0 - behind) * done
     if code == SPENT:
         pair.aim_part = 1.0 if to == 1.0 else (to - done) / (1.0 - done)
