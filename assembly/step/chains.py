@@ -73,11 +73,12 @@ def chained(drawn: Drawn, patch: Patch) -> tuple[Drawn, Array, float]:
     if any(curves):
         curves = list(curves)
         levels = rows[:, _LEVEL].tolist()
+        polar = patch if patch.surface._pole_bits else None
         for k, ((start, end), by) in enumerate(zip(ends.tolist(), shifts[:n].tolist(), strict=True)):
             curve = curves[k]
             if curve is not None:
                 curve = shifted(curve, shifts[k]) if any(by) else curve
-                curves[k] = moved(curve, levels[k], (start[0], start[1]), (end[0], end[1]))
+                curves[k] = moved(curve, levels[k], (start[0], start[1]), (end[0], end[1]), polar)
     return drawn._replace(rows=rows, curves=curves), ends, worst
 
 

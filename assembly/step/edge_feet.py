@@ -16,6 +16,8 @@ from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
 # Most steps of a projection, and the length of a step, relative to the domain or the size, that is only rounding.
 _STEPS, _LAST = 30, 1e-13
+# Distance from a pole, over the size, within which nothing has a direction from it.
+AT_POLE = 1e-9
 # A projection is lost if it takes a step longer than this part of the side of the domain.
 _LOST = 0.25
 # At this sine of the angle between two surfaces a point is moved two thirds of the way to their intersection; from 2.5
@@ -28,8 +30,9 @@ _DAMPED = 1e-6
 
 # A surface: its table and pool as in `NurbsSurface`, and its size [length].
 Ground = namedtuple("Ground", "table pool size")
-# Gauss-Newton's step toward a point's projection, how far above the surface the point is, and the unit normal there.
-_Approach = namedtuple("_Approach", "du dv height normal")
+# Gauss-Newton's step toward a point's projection, how far above the surface the point is, the unit normal there, and
+# the lengths of Su and Sv.
+_Approach = namedtuple("_Approach", "du dv height normal along_u along_v")
 
 
 @kernel(inline=True)
@@ -73,13 +76,39 @@ def _approach(ground, u, v, point):
         du, dv = (c * f - b * g) / both, (a * g - b * f) / both
     else:
         # Where a parameter has no direction, at poles, it stays.
-        if np.sqrt(a) * (u1 - u0) > 1e-9 * ground.size:
+        if np.sqrt(a) * (u1 - u0) > AT_POLE * ground.size:
             du = f / a
-        if np.sqrt(c) * (v1 - v0) > 1e-9 * ground.size:
+        if np.sqrt(c) * (v1 - v0) > AT_POLE * ground.size:
             dv = g / c
     normal = cross(su, sv)
     normal = scale(1.0 / max(np.sqrt(dot(normal, normal)), 1e-300), normal)
-    return _Approach(du, dv, dot(normal, off), normal)
+    return _Approach(du, dv, dot(normal, off), normal, np.sqrt(a), np.sqrt(c))
+
+
+@kernel(inline=True)
+def _by_pole(gap, around, along, turn, rise, least):
+    """A step beside a pole: how far around it and how far away from it, in parameters.
+
+    The surface counts as flat there: the step is a straight line in polar coordinates about the pole, so that one that
+    passes it goes round it. One that begins or ends at the pole does not turn.
+
+    Parameters
+    ----------
+    gap
+        How far away the pole is in its parameter.
+    around, along
+        Lengths of the derivatives by the parameter around it and by the one that leads away.
+    turn, rise
+        Gauss-Newton's step in these.
+    least
+        What is nearer is at the pole.
+    """
+    far = gap * along
+    out, aside = far + rise * along, turn * around
+    beyond = np.hypot(out, aside)
+    if not (far > 0.0 and around > 0.0 and beyond > least):
+        return 0.0, rise
+    return np.arctan2(aside, out) * far / around, (beyond - far) / along
 
 
 @kernel(inline=True)
@@ -87,8 +116,20 @@ def _moved(ground, u, v, step):
     """Parameters after a step, within an open domain."""
     patch = surface_at(ground.table, 0)
     (u0, u1), (v0, v1) = _ends(ground)
-    u += step.du
-    v += step.dv
+    du, dv = step.du, step.dv
+    # The pole at the nearer end.
+    if patch.poles & 12 != 0:
+        is_low = patch.poles & 12 == 4 or (patch.poles & 4 != 0 and v - v0 < v1 - v)
+        gap, sense = (v - v0, 1.0) if is_low else (v1 - v, -1.0)
+        du, dv = _by_pole(gap, step.along_u, step.along_v, du, sense * dv, AT_POLE * ground.size)
+        dv *= sense
+    elif patch.poles & 3 != 0:
+        is_low = patch.poles & 3 == 1 or (patch.poles & 1 != 0 and u - u0 < u1 - u)
+        gap, sense = (u - u0, 1.0) if is_low else (u1 - u, -1.0)
+        dv, du = _by_pole(gap, step.along_v, step.along_u, dv, sense * du, AT_POLE * ground.size)
+        du *= sense
+    u += du
+    v += dv
     if patch.closed_u == 0:
         u = min(max(u, u0), u1)
     if patch.closed_v == 0:
@@ -100,10 +141,17 @@ def _moved(ground, u, v, step):
 def _foot(ground, u, v, point):
     """Parameters of the nearest point on the surface, and whether the steps converged."""
     (u0, u1), (v0, v1) = _ends(ground)
+    side_u, side_v = u1 - u0, v1 - v0
     far, before = np.inf, np.inf
     for _ in range(_STEPS):
-        new_u, new_v = _moved(ground, u, v, _approach(ground, u, v, point))
-        far = max(abs(new_u - u) / (u1 - u0), abs(new_v - v) / (v1 - v0))
+        step = _approach(ground, u, v, point)
+        new_u, new_v = _moved(ground, u, v, step)
+        part_u, part_v = abs(new_u - u) / side_u, abs(new_v - v) / side_v
+        if surface_at(ground.table, 0).poles != 0:
+            # A turn around a pole is as short as it is in space.
+            part_u *= min(1.0, step.along_u * side_u / ground.size)
+            part_v *= min(1.0, step.along_v * side_v / ground.size)
+        far = max(part_u, part_v)
         u, v = new_u, new_v
         # The last steps are rounding, whatever the coordinates are.
         if far <= _LAST or not far <= _LOST or (far <= 1e3 * _LAST and far >= 0.5 * before):

@@ -43,8 +43,9 @@ Array = NDArray[np.float64]
 SLACK = 1.0 / 32.0
 # Angles that differ by less are one.
 _SAME_ANGLE = 1e-6
-# Degree and number of halvings of curves that are interpolated.
-_DEGREE, _HALVINGS = 7, 14
+# Degree of curves that are interpolated, most halvings of a stretch, and most stretches that are halved at once: of a
+# curve with one sharp turn there are few, of one that is not smooth all.
+_DEGREE, _HALVINGS, _HALVED = 7, 26, 4096
 
 
 class Unreadable(AssemblyError):
@@ -182,10 +183,16 @@ def _ring(low: float, high: float, spans: int) -> Array:
     return np.column_stack([ring, weights])
 
 
-def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> tuple[Spline, float]:
+def approximated(
+    function: Callable[[Array], Array],
+    breaks: Array,
+    tolerance: float,
+    counts: Callable[[Array], Array] | None = None,
+) -> tuple[Spline, float]:
     """A piecewise polynomial through a function, (n,) -> (n, d), that is smooth between breaks.
 
-    Interpolates at Chebyshev's points of each piece, ends included, and halves pieces until they fit.
+    Interpolates at Chebyshev's points of each piece, ends included, and halves pieces until they fit. `counts`, if
+    given, is from values (n, d) to by how much a deviation there counts in each coordinate, at most one.
 
     Returns
     -------
@@ -206,13 +213,17 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
         asked = function((low[:, None] + (high - low)[:, None] * parts).ravel()).reshape(len(low), len(parts), -1)
         pieces = solve @ asked[:, : _DEGREE + 1]
         pieces[:, 0], pieces[:, -1] = asked[:, 0], asked[:, _DEGREE]
-        errors = np.abs(check @ pieces - asked[:, _DEGREE + 1 :]).max(axis=(1, 2))
+        between = asked[:, _DEGREE + 1 :]
+        off = np.abs(check @ pieces - between)
+        if counts is not None:
+            off *= counts(between.reshape(-1, between.shape[2])).reshape(between.shape)
+        errors = off.max(axis=(1, 2))
         fits = ~(errors > tolerance)
         found.append((low[fits], high[fits], pieces[fits]))
         worst = max(worst, float(errors[fits].max(initial=0.0)))
         if fits.all():
             break
-        if depth == _HALVINGS:
+        if depth == _HALVINGS or np.count_nonzero(~fits) > max(_HALVED, breaks.size):
             raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
         low, high = low[~fits], high[~fits]
         middle = 0.5 * (low + high)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.step.crossings import crossings
-from assembly.step.edge_feet import distance_across, fill_surface_points, move_between, move_to_feet
+from assembly.step.edge_feet import AT_POLE, distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
@@ -176,6 +176,10 @@ class _Edge:
         given = self.own.given(t)
         return float(distance_across(self.own.ground, t, np.ascontiguousarray(given), self._from(t, given)))
 
+    def ends_at_pole(self, low: float, high: float) -> bool:
+        """Whether the curve that is given begins or ends where a parameter has no direction."""
+        return bool((self.own.patch.counts(self.own.given(np.array([low, high]))) <= AT_POLE).any())
+
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
         return self._from(t, self.own.given(t))
@@ -256,6 +260,9 @@ def projected(space: Space, own: Side, other: Side | None, low: float, high: flo
     try:
         if not made.off(np.linspace(low, high, 2 * _PLACES)) > _OFF * made.size:
             return None
-        return approximated(made.projection, made.joints(low, high), _FOLLOWED * float(own.patch.sides.min()))
+        # Beside a pole a turn counts as what it is in space. At the pole itself it is all that tells the direction of
+        # an edge, where the next one begins.
+        counts = own.patch.counts if own.patch.surface._pole_bits and not made.ends_at_pole(low, high) else None
+        return approximated(made.projection, made.joints(low, high), _FOLLOWED * float(own.patch.sides.min()), counts)
     except Unreadable:
         return None

@@ -28,6 +28,7 @@ from assembly.step.carriers import carrier_of, spline_curve
 from assembly.step.crossings import crossings
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import approximated
+from assembly.step.turned_spheres import region_of
 
 __all__ = ["Sewn", "sewn"]
 
@@ -282,10 +283,11 @@ def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
 
     OCCT knows that angles go on. Of a spline it would take points of a second turn for those of the first.
     """
-    surface, chains = cut_open(face)
+    region = region_of(face)
+    surface, chains = cut_open(region)
     found = [(surface, chains)]
     for axis in (0, 1):
-        period = face.surface._periods[axis]
+        period = region.surface._periods[axis]
         if not period or surface.closed[axis]:
             continue
         low, high = surface.domain[axis]

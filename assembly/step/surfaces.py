@@ -80,6 +80,22 @@ class Patch:
         """Periods in u and v; infinite where the surface is not closed."""
         return np.where(self.surface.closed, self.sides, np.inf)
 
+    def counts(self, places: Array) -> Array:
+        """By what share of itself a difference in our u, and in our v, counts at places (n, 2): by one but at poles.
+
+        Around a pole it counts as what it is in space, over the size of the surface.
+        """
+        surface, bits = self.surface, self.surface._pole_bits
+        u, v = (
+            row if closed else np.clip(row, *ends)
+            for row, closed, ends in zip(places.T, surface.closed, surface.domain, strict=True)
+        )
+        made = np.ones((len(places), 2))
+        for axis, row in enumerate(surface.evaluate(u, v, 1)[1:]):
+            if bits & (12, 3)[axis]:
+                made[:, axis] = np.minimum(1.0, np.linalg.norm(row, axis=1) * self.lengths[axis] / surface.size)
+        return made
+
 
 def _slack(low: float, high: float, least: float = -np.inf, most: float = np.inf) -> tuple[float, float]:
     """An interval made a little larger, within bounds; an end within the slack of its bound goes there."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import place_of
+from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.edge_ends import EDGE, EDGE_SIZE, FOLLOWED, FREE, LEVEL, U_LEVEL, UNKNOWN, V_LEVEL, level_lines
@@ -33,6 +34,8 @@ Pair = tuple[float, float]
 FOLLOW = 1e-10
 # A move of an end is spread over the first legs of the control polygon that together are this many times as long.
 GENTLE = 10.0
+# Most halvings of a stretch whose end is moved beside a pole.
+_HALVINGS = 40
 # Columns of records of edges: both ends, the interval, and what else is asked for here.
 ENDS, LOW, HIGH = slice(0, 4), place_of(EDGE, "low"), place_of(EDGE, "high")
 TOLERANCE, _LEVEL, _LINE = (place_of(EDGE, name) for name in ("tolerance", "level", "line"))
@@ -76,8 +79,16 @@ class Drawn(NamedTuple):
         return float(self.rows[:, TOLERANCE].max())
 
 
-def moved(curve: Spline, level: float, start: Pair, end: Pair) -> Spline:
-    """A curve in (u, v) with its two ends at two points; what is level stays so."""
+def moved(curve: Spline, level: float, start: Pair, end: Pair, patch: Patch | None = None) -> Spline:
+    """A curve in (u, v) with its two ends at two points; what is level stays so.
+
+    `patch` is given where the surface has poles.
+    """
+    counts = np.ones((2, 2))
+    if patch is not None:
+        counts = patch.counts(np.array([start, end]))
+        for to, is_last in ((start, False), (end, True)):
+            curve = _halved(curve, np.array(to), is_last, patch)
     made = curve.points.copy()
     if len(made) == 2 and made[0, 2] == made[1, 2] == 1.0:
         made[:, :2] = start, end
@@ -85,9 +96,26 @@ def moved(curve: Spline, level: float, start: Pair, end: Pair) -> Spline:
     for axis, kept in ((0, U_LEVEL), (1, V_LEVEL)):
         if level == kept:
             made[:, axis] = start[axis] * made[:, 2]
-    for points, to in ((made, start), (made[::-1], end)):
-        _move_end(points, np.array(to))
+    for points, to, count in ((made, start, counts[0]), (made[::-1], end, counts[1])):
+        _move_end(points, np.array(to), count)
     return Spline(made, curve.knots, curve.degree)
+
+
+def _halved(curve: Spline, to: Array, is_last: bool, patch: Patch) -> Spline:
+    """A curve whose stretch at an end is short enough for the end to be moved there.
+
+    A turn around a pole by which nothing moves at the end moves what is farther away.
+    """
+    for _ in range(_HALVINGS):
+        inner = np.unique(curve.knots)
+        points, a, b = (curve.points[::-1], *inner[:-3:-1]) if is_last else (curve.points, *inner[:2])
+        move, beyond = to - points[0, :2] / points[0, 2], points[curve.degree]
+        near, far = patch.counts(np.array([to, beyond[:2] / beyond[2]]))
+        if np.abs(move * far).max() <= max(2.0 * GENTLE * np.abs(move * near).max(), FOLLOW * patch.sides.min()):
+            break
+        made, knots = bezier.insert(curve.points, curve.knots, curve.degree, 0.5 * (a + b), curve.degree)
+        curve = Spline(made, knots, curve.degree)
+    return curve
 
 
 def shifted(curve: Spline, by: Array) -> Spline:
@@ -97,15 +125,15 @@ def shifted(curve: Spline, by: Array) -> Spline:
     return Spline(made, curve.knots, curve.degree)
 
 
-def _move_end(points: Array, to: Array) -> None:
+def _move_end(points: Array, to: Array, count: Array) -> None:
     """Move the first control point, homogeneous in (u, v), and some after it by a share of the move.
 
     Moving the first one alone by more than its leg would turn the curve back. The share falls evenly along the control
-    polygon, from one at the end to zero where `GENTLE` moves are passed.
+    polygon, from one at the end to zero where `GENTLE` moves are passed, as long as their parts in u and in v count.
     """
     plane = points[:, :2] / points[:, 2:]
     move = to - plane[0]
-    far = float(np.hypot(*move)) * GENTLE
+    far = float(np.hypot(*(count * move))) * GENTLE
     legs = np.hypot(*np.diff(plane, axis=0).T)
     if legs[0] < far:
         share = np.maximum(0.0, 1.0 - np.cumsum(legs) / far)

@@ -203,6 +203,49 @@ def test_approximations_say_how_far_off_they_are():
         approximated(lambda t: np.abs(t[:, None] - 0.3), np.array([0.0, 1.0]), 1e-12)
 
 
+def test_a_sharp_turn_is_followed_and_noise_is_not():
+    """A line that passes a pole by a millionth, in polar coordinates, and what no curve follows."""
+
+    def past(t):
+        return np.column_stack([np.arctan2(t, 1e-6), np.hypot(t, 1e-6)])
+
+    made, _ = approximated(past, np.array([-1.0, 1.0]), 1e-10, lambda at: np.column_stack([at[:, 1], np.ones(len(at))]))
+    points, _ = made.cartesian
+    t = np.concatenate([-np.geomspace(1e-9, 1.0, 3000), np.geomspace(1e-9, 1.0, 3000)])
+    turn, far = asm.NurbsCurve(points, made.knots, made.degree).evaluate(t).T
+    assert np.abs(np.column_stack([far * np.cos(turn) - 1e-6, far * np.sin(turn) - t])).max() < 2e-10
+    calls = []
+
+    def noise(t):
+        calls.append(t.size)
+        return np.sin(1e9 * t)[:, None]
+
+    with pytest.raises(Unreadable, match="too sharply"):
+        approximated(noise, np.array([0.0, 1.0]), 1e-10)
+    assert sum(calls) < 1e6
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_an_end_that_turns_around_a_pole_moves_nothing_far_from_it(end):
+    """A meridian that ends a millionth from the pole, its end moved around that by a tenth of a turn."""
+    sphere = asm.shapes.sphere(2.0)
+    place = Patch(sphere, Straight(True), Straight(True))
+    top = sphere.domain[1][1]
+    at = np.linspace(0.5 * top, top - 1e-6, 8)
+    points = np.column_stack([np.full(8, 1.0), at])[:: 1 if end else -1]
+    given = spline(points, np.repeat([0.0, 1.0], 8), 7)
+    ends = [tuple(row) for row in points[[0, -1]].tolist()]
+    ends[end] = (1.0 + 0.1 * sphere.domain[0][1], ends[end][1])
+    made = moved(given, FREE, *ends, place)
+    curves = [asm.NurbsCurve(one.cartesian[0], one.knots, 7) for one in (given, made)]
+    assert [tuple(row) for row in curves[1].control_points[[0, -1]].tolist()] == ends
+    inner = np.geomspace(1e-9, 1.0, 4000)
+    t = 1.0 - inner if end else inner
+    both = [sphere.evaluate(*curve.evaluate(t).T) for curve in curves]
+    # The end itself moves by 6e-7.
+    assert np.abs(both[1] - both[0]).max() < 1e-5
+
+
 def test_both_sides_of_a_seam_end_at_the_same_places():
     # A cylinder whose lower edge comes back 1e-8 beside and above where it began.
     turn = Turning.over(0.0, U, 1.0)

@@ -89,6 +89,30 @@ def written(shape, path):
     return path
 
 
+def read_by_occt(path):
+    with quiet():
+        reader = O.STEPControl_Reader()
+        reader.ReadFile(str(path))
+        reader.TransferRoots()
+        return reader.OneShape()
+
+
+def same(found, wanted):
+    """Whether a volume, an area and a center agree with others."""
+    volume, area, center = wanted
+    return (
+        abs(found[0] / volume - 1.0) < CLOSE
+        and abs(found[1] / area - 1.0) < CLOSE
+        and np.abs(found[2] - center).max() < NEAR * sqrt(area)
+    )
+
+
+def has_dome(shape):
+    """Whether a shape has a surface of revolution, which has no other axis: OCCT misreads some that have a pole."""
+    surfaces = (O.BRep_Tool.Surface_s(O.as_face(face)) for face in parts(shape, O.TopAbs_FACE))
+    return any(isinstance(surface, O.Geom_SurfaceOfRevolution) for surface in surfaces)
+
+
 def is_sound(shape):
     """Whether OCCT has made something that it finds valid."""
     return bool(parts(shape, O.TopAbs_SOLID)) and O.BRepCheck_Analyzer(shape).IsValid()
@@ -174,6 +198,24 @@ def test_both_ways(name, tmp_path):
         path = tmp_path / f"ours.{write.__name__.removeprefix('write_')}"
         write(path, bodies)
         assert agrees(read(path), wanted)
+    assert same(measured(read_by_occt(tmp_path / "ours.step")), wanted)
+
+
+# Seeds of shapes of which OCCT read the complement of a face in what was written of them about its own axis.
+@pytest.mark.parametrize("seed", [24, 54, 73, 113, 128, 155, 228, 264])
+def test_occt_reads_what_is_written(seed, tmp_path):
+    shape = by_random(seed)
+    asm.write_step(tmp_path / "ours.step", asm.read_step(written(shape, tmp_path / "given.step")))
+    assert same(measured(read_by_occt(tmp_path / "ours.step")), measured(shape))
+
+
+def test_an_edge_that_ends_a_millionth_from_a_pole_is_projected(tmp_path):
+    """OCCT's curve on the surface is off by 9e-3; feet were lost beside the pole, and the edge was left as it was."""
+    shape = by_random(83)
+    volume, area, _ = measured(shape)
+    (body,) = asm.read_step(written(shape, tmp_path / "given.step"))
+    assert abs(body.volume / volume - 1.0) < 1e-9
+    assert abs(body.area / area - 1.0) < 1e-9
 
 
 @pytest.mark.parametrize("seed", [61, 138])
@@ -198,6 +240,7 @@ def test_random_shapes(tmp_path, cases):
             asm.write_step(tmp_path / "ours.step", bodies)
             again = asm.read_step(tmp_path / "ours.step")
             right = agrees(bodies, wanted) and agrees(again, wanted)
+            right = right and (has_dome(shape) or same(measured(read_by_occt(tmp_path / "ours.step")), wanted))
         except InputError:
             refused += 1
             continue

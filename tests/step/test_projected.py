@@ -183,6 +183,36 @@ def test_points_are_moved_the_same_whichever_they_are_with():
     assert np.abs(turned.evaluate(*feet.T) - moved).max() < 1e-12
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("distance", [1e-6, 1e-4, 1e-2])
+def test_feet_are_found_beside_poles(distance, turned):
+    """From places on the other side of a pole as well, where a step in (u, v) alone goes far astray."""
+    rng = np.random.default_rng(5)
+    for made in (asm.shapes.sphere(2.0), asm.shapes.cone(2.0, 3.0), asm.shapes.ellipsoid(3.0, 2.0, 2.5)):
+        surface = made.transposed() if turned else made
+        axis = 0 if turned else 1
+        ends = made.domain[1]
+        places = np.column_stack([rng.uniform(*made.domain[0], 60), ends[1] - distance * rng.uniform(0.3, 3.0, 60)])
+        wanted = made.evaluate(*places.T)
+        starts = np.column_stack([rng.uniform(*made.domain[0], 60), ends[1] - distance * rng.uniform(0.3, 3.0, 60)])
+        feet = np.ascontiguousarray(starts[:, ::-1] if turned else starts)
+        assert move_to_feet((*surface._tables, surface.size), wanted, feet)
+        assert np.abs(surface.evaluate(*feet.T) - wanted).max() < 1e-13
+        # Around by less than half a turn, and not through the pole.
+        assert (feet[:, axis] < ends[1]).all()
+        assert (
+            np.abs(feet - (starts[:, ::-1] if turned else starts))[:, 1 - axis].max() <= 0.5 * made._periods[0] + 1e-9
+        )
+
+
+def test_what_begins_at_a_pole_keeps_its_direction():
+    surface = asm.shapes.sphere(2.0)
+    top = surface.domain[1][1]
+    feet = np.array([[1.2, top], [3.4, top - 1e-15]])
+    assert move_to_feet((*surface._tables, surface.size), np.array([[1e-13, 2e-13, 2.0], [0.0, 0.0, 2.0]]), feet)
+    np.testing.assert_array_equal(feet[:, 0], [1.2, 3.4])
+
+
 def test_where_surfaces_are_tangent_points_stay():
     turned, flat = asm.shapes.cylinder(2.0, 6.0), asm.shapes.plane(9.0, 9.0)
     beside = asm.NurbsSurface(flat.control_points[..., [2, 1, 0]] + [2.0, 0.0, 0.0], flat.knots, (1, 1))
