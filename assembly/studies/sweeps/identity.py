@@ -29,7 +29,7 @@ def manifest_of(scene: Assembly, plan: Plan, columns: tuple[Column, ...], swept:
     """
     manifest = {
         "format": "assembly-study",
-        "version": 1,
+        "version": 2,
         "scene": _scene_hash(scene),
         "plan": plan.kind,
         "seed": plan.seed,

@@ -7,9 +7,10 @@ arrays for a chunk, whose cost a row is small, and not some objects for a row.
 from __future__ import annotations
 
 import copy
+import pickle
 from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +129,33 @@ class ChunkDone(NamedTuple):
             kernels,
             interrupted,
         )
+
+    def __reduce__(self) -> tuple[Callable[[bytes], ChunkDone], tuple[bytes]]:
+        """As bytes: Dask sends each array by itself, and of coarse rows there are two for each."""
+        content = [_stacked(self.starts) if name == "starts" else each for name, each in self._asdict().items()]
+        return _from_bytes, (pickle.dumps(content),)
+
+
+def _stacked(starts: dict[int, list[Start | None]]) -> tuple[Any, ...]:
+    """Starts of runs as arrays: which run each is of, whether there is one, and those that there are."""
+    each = [start for of_run in starts.values() for start in of_run]
+    there = [start for start in each if start is not None]
+    counts = [len(of_run) for of_run in starts.values()]
+    arrays = [np.array([start[k] for start in there]) for k in range(len(Start._fields))]
+    return list(starts), counts, [start is not None for start in each], arrays
+
+
+def _from_bytes(content: bytes) -> ChunkDone:
+    """A chunk that was pickled."""
+    done = ChunkDone(*pickle.loads(content))
+    runs, counts, is_there, arrays = cast("Any", done.starts)
+    remaining, each = map(Start, *arrays), iter(is_there)
+    return done._replace(
+        starts={
+            run: [next(remaining) if next(each) else None for _ in range(count)]
+            for run, count in zip(runs, counts, strict=True)
+        }
+    )
 
 
 class Rows:
