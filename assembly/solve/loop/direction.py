@@ -37,7 +37,7 @@ def first_shift(program, restoring, shift, violation, dual):
 
 
 @kernel(inline=True)
-def find_direction(program, current, rows, system, trust, restoring):
+def find_direction(program, current, rows, system, trust, restoring, tick):
     """Compute the step of the augmented Lagrangian at a point, into the system.
 
     Sets which rows are active, their forces, and which are active because the step would break them. Returns the shift
@@ -57,7 +57,8 @@ def find_direction(program, current, rows, system, trust, restoring):
     find_ends(program, current, system.directions)
     curvature_multipliers(rows, current.residual, restoring)
     add_row_terms(program, current, rows.forces, rows.active, lagrangian)
-    let_pushing_count(program, current, rows, system)
+    if not tick:
+        let_pushing_count(program, current, rows, system)
     hold_ends(system)
     shift = factorize_shifted(lagrangian, n, order, shift, matrix)
     if shift < 0.0:
