@@ -7,8 +7,14 @@ import pytest
 from scipy.optimize import nnls
 
 from assembly._record import Store
-from assembly.constraints.program.records import Iterate, Program, Sparsity
-from assembly.solve.loop.multipliers import leave_out, predict_active_set, pushing_multipliers
+from assembly.constraints.program.records import Iterate, Program, Sparsity, header_at
+from assembly.solve.loop.multipliers import (
+    leave_out,
+    let_pushing_count,
+    predict_active_set,
+    pushing_multipliers,
+    weigh_rows,
+)
 from assembly.solve.loop.parameters import EXCHANGES, NEAR, ROUNDS
 from assembly.solve.loop.residuals import Structure
 from assembly.solve.loop.workspace import Directions, System, new_rows
@@ -105,3 +111,52 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         assert abs(hessian).max() < 1e-15 * 1e2 / mu
     # Some take more rounds than the loop once allowed, and some change places for ever.
     assert max(rounds) > 4 and 180 < len(rounds) < 200
+
+
+def test_rows_with_a_multiplier_and_a_gap_count_from_the_start_and_only_while_they_push():
+    rng = np.random.default_rng(5)
+    mu, rows, agreed, kept, released = 1e-6, 6, 0, 0, 0
+    # Row 0 is of a contact, row 1 of a trim: it is left to the step.
+    table = np.zeros(200, dtype=np.int64)
+    header_at(table, 0).contacts, header_at(table, 0).trims = 1, 1
+    for _ in range(200):
+        wide = np.zeros((rows, 18))
+        wide[:, :6] = rng.normal(size=(rows, 6))
+        one_sided = np.array([1, 1, 1, 1, 1, 0])
+        shape = Structure(np.tile([0, -1, -1], (rows, 1)), one_sided, DENSE, None)
+        y = np.where(rng.uniform(size=rows) < 0.7, -rng.uniform(0.01, 1.0, rows), 0.0)
+        # What is left after sliding, and a row that is violated.
+        residual = rng.uniform(1e-5, 1e-3, rows) * [1, 1, 1, 1, -1, 1]
+        gradient = rng.normal(size=6)
+        given = new_rows(rows, mu)
+        given.y[:] = y
+        weigh_rows(given, one_sided, residual)
+        counted = given.active > 0.0
+        assert counted.tolist() == [False] * 4 + [True] * 2
+        jacobian = wide[:, :6]
+        forces = y + residual / mu
+        descent = -gradient - jacobian[counted].T @ forces[counted]
+        hessian = np.triu(jacobian[counted].T @ jacobian[counted] / mu)
+        before = descent.copy(), hessian.copy()
+        program = Program(Store(table, None), shape, None, None, None)
+        point = Iterate(None, None, None, residual, wide)
+        system = System(gradient, Directions(descent, np.zeros(6), None, None), hessian, None)
+        let_pushing_count(program, point, given, system)
+        pushed = (y < 0.0) & ~counted & (np.arange(rows) != 1)
+        assert (given.foreseen == pushed).all() and ((given.active > 0.0) == (counted | pushed)).all()
+        for _ in range(20):
+            step = np.linalg.solve(np.eye(6) + np.triu(hessian) + np.triu(hessian, 1).T, descent)
+            system.directions.step[:] = step
+            if predict_active_set(program, point, given, system) == 0:
+                agreed += 1
+                there = forces + jacobian @ step / mu
+                # Those that were violated count however they end.
+                assert ((given.active > 0.0) == ((there < 0.0) | counted))[np.arange(rows) != 1].all()
+                kept += (pushed & (given.foreseen == 1.0)).sum()
+                released += (pushed & (given.foreseen == 0.0)).sum()
+                break
+        leave_out(shape, point, given, system)
+        assert ((given.active > 0.0) == counted).all()
+        for after, at_first in zip((descent, hessian), before, strict=True):
+            assert abs(after - at_first).max() < 1e-14 * 1e2 / mu
+    assert agreed > 180 and kept > 50 and released > 50

@@ -31,7 +31,7 @@ def find_step(task, current, trial, rows, system):
     loop.shift = first_shift(program, restoring, loop.shift, loop.violation, loop.dual)
     damps = header_at(program.store.table, 0).contacts == 0 or loop.cuts >= OFTEN
     trust = Trust(loop.shift, min(reach, loop.cut_length), damps)
-    shift, used, longest, turn = find_direction(program, current, rows, system, trust, restoring)
+    shift, used, longest, turn = find_direction(program, current, rows, system, trust, restoring, task.tick)
     loop.shift, loop.used_shift, loop.longest = shift, used, longest
     if used < 0.0:
         loop.status = STALLED

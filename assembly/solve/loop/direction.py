@@ -11,7 +11,13 @@ from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.ends import find_ends, hold_ends
 from assembly.solve.loop.line_search import Trust, damped_step
-from assembly.solve.loop.multipliers import curvature_multipliers, leave_out, predict_active_set, weigh_rows
+from assembly.solve.loop.multipliers import (
+    curvature_multipliers,
+    leave_out,
+    let_pushing_count,
+    predict_active_set,
+    weigh_rows,
+)
 from assembly.solve.loop.parameters import FORESEEN, KICK, LEAST_SHIFT, NEARLY_HELD, SADDLE, SHIFT, TINIEST_SHIFT
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
@@ -31,7 +37,7 @@ def first_shift(program, restoring, shift, violation, dual):
 
 
 @kernel(inline=True)
-def find_direction(program, current, rows, system, trust, restoring):
+def find_direction(program, current, rows, system, trust, restoring, tick):
     """Compute the step of the augmented Lagrangian at a point, into the system.
 
     Sets which rows are active, their forces, and which are active because the step would break them. Returns the shift
@@ -51,6 +57,8 @@ def find_direction(program, current, rows, system, trust, restoring):
     find_ends(program, current, system.directions)
     curvature_multipliers(rows, current.residual, restoring)
     add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+    if not tick:
+        let_pushing_count(program, current, rows, system)
     hold_ends(system)
     shift = factorize_shifted(lagrangian, n, order, shift, matrix)
     if shift < 0.0:

@@ -46,20 +46,39 @@ def let_count(shape, r, counts, point, rows, system):
     add_square(shape.sparsity, shape.bases, jacobian, r, sign / mu, system.hessian)
 
 
+@kernel(inline=True)
+def is_trim(table, r):
+    """Whether row r is of a trim. Its slope changes too fast for a prediction."""
+    header = header_at(table, 0)
+    return header.contacts <= r < header.contacts + header.trims
+
+
+@kernel(inner=True)
+def let_pushing_count(program, point, rows, system):
+    """Make one-sided rows active that have a multiplier but a gap, by which c / mu outweighs it.
+
+    Bodies that slide over each other part by the square of a step. The rows are active until `predict_active_set` finds
+    that they do not push at the end of the step.
+    """
+    shape = program.structure
+    for r in range(rows.count):
+        is_idle = shape.one_sided[r] == 1 and rows.active[r] == 0.0
+        if is_idle and rows.y[r] < 0.0 and not is_trim(program.store.table, r):
+            let_count(shape, r, True, point, rows, system)
+
+
 @kernel(inner=True)
 def predict_active_set(program, point, rows, system):
     """Make one-sided rows active that are idle here and would push at the end of the step, and others inactive.
 
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
     """
-    header = header_at(program.store.table, 0)
     shape, step, foreseen = program.structure, system.directions.step, rows.foreseen
     changed = 0
     for r in range(rows.count):
         if shape.one_sided[r] == 0 or (rows.active[r] > 0.0 and foreseen[r] == 0.0):
             continue
-        if header.contacts <= r < header.contacts + header.trims:
-            # Their slopes change too fast for a prediction.
+        if is_trim(program.store.table, r):
             continue
         pushes = rows.y[r] + (point.residual[r] + times(shape.bases, point.jacobian, r, step)) / rows.mu < 0.0
         if pushes != (foreseen[r] == 1.0):
