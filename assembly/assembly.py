@@ -110,7 +110,7 @@ class Assembly(Solving):
             is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
             # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
             if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
-                straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
+                straight = straight_from(q0, self._scene, self._packed)
                 if straight is not None:
                     return straight
             interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)

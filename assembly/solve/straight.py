@@ -21,7 +21,7 @@ from assembly.solve.solution import Solution
 __all__ = ["straight_from"]
 
 
-def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, has_objective: bool) -> Solution | None:
+def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None) -> Solution | None:
     """The solution at which the loop arrives from another one, for a scene as it is packed; None if more may be needed.
 
     Parameters
@@ -32,8 +32,6 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, h
         What the new solution speaks of; None, as `packed` is, where nothing is packed yet.
     packed : Packed or None
         How the scene was packed for its last solve.
-    has_objective : bool
-        Whether the scene has an objective.
     """
     if packed is None or scene is None:
         return None
@@ -54,7 +52,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, h
         packed.refresh()
         if packed.has_coupled_angles:
             packed.start_angles(state, True)
-        code = workspace.go_on(packed, has_objective, state)
+        code = workspace.go_on(packed, state)
         # The next solve writes to the same memory.
         history = workspace.rows_of_history()
         seconds = perf_counter() - begin

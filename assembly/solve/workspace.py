@@ -50,19 +50,19 @@ class Workspace:
         What `solve_program` takes behind the state: history, doubles and integers.
     """
 
-    __slots__ = ("_has_objective", "_history", "_kept", "_lent", "_orders", "_pool", "_thread", "arrays")
+    __slots__ = ("_history", "_kept", "_lent", "_orders", "_pool", "_thread", "arrays")
 
     def __init__(self, packed: Packed) -> None:
         self.arrays = new_workspace(packed)
-        # Whose arrays are lent, on which thread, and whether there is an objective.
+        # Whose arrays are lent, and on which thread.
         self._pool: Array | None = None
-        self._thread, self._has_objective = 0, False
+        self._thread = 0
         self._kept: tuple[Any, ...] = ()
 
-    def go_on(self, packed: Packed, has_objective: bool, state: Array) -> int:
+    def go_on(self, packed: Packed, state: Array) -> int:
         """Run the loop on a state that a solution has left, which is written to; how it ended."""
-        if self._has_objective is not has_objective or self._thread != get_ident():
-            self._lend(packed, has_objective)
+        if self._thread != get_ident():
+            self._lend(packed)
         elif self._pool is not packed.rows_pool:
             self._lend_numbers(packed)
         return int(run_straight(self._lent, state, packed.end_effectors))
@@ -84,11 +84,11 @@ class Workspace:
         self._kept = (*arrays, *self._kept[2:])
         self._pool = packed.rows_pool
 
-    def _lend(self, packed: Packed, has_objective: bool) -> None:
+    def _lend(self, packed: Packed) -> None:
         """Lend the arrays of a packed scene, and settings for this thread."""
         # A signal's handler may raise anywhere below: what is lent is then nobody's.
         self._thread = 0
-        settings = scene_settings({}, CTRL_C, has_objective, True)
+        settings = scene_settings({}, CTRL_C, not packed.is_implicit, True)
         orders = np.zeros(size_of(ORDERS), dtype=np.int64)
         orders[place_of(ORDERS, "loop")] = loop_address(packed.end_effectors)
         orders[place_of(ORDERS, "count_at")] = packed.results_at + COUNT
@@ -101,4 +101,4 @@ class Workspace:
         self._kept = lent
         self._orders: Any = orders.data
         self._history: Any = self.arrays[0].reshape(-1).data
-        self._pool, self._thread, self._has_objective = packed.rows_pool, get_ident(), has_objective
+        self._pool, self._thread = packed.rows_pool, get_ident()

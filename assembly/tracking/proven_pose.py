@@ -108,6 +108,7 @@ class ProvenPose:
         if self._judge is None:
             self._judge = new_proof(self.at.packed, self.at.scene.bodies)
             self._judge.make_slimmer(self._slimmer)
+            self._judge.fronts.counts.budget = self.proof.fronts.counts.budget
             self._judge.until = self.proof.until
         return self._judge
 

@@ -184,7 +184,7 @@ class TickProof:
         if not which:
             return []
         q, touching = self._there.q, self._last.touching
-        found = yield from self._last.judge.looking(q, touching, moves, which=which, budget=BUDGET)
+        found = yield from self._last.judge.looking(q, touching, moves, which=which)
         answers = dict(zip(which, found, strict=True))
         clear = [k for k in which if is_proven(answers[k])]
         self._answers |= {k: answers[k] for k in which if k not in clear}

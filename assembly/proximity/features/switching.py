@@ -182,7 +182,13 @@ def track_features(store, shells, pose, codes, x, n, size, turn):
     shell_f, shell_g = shells
     switches = 0
     before = n
+    # Where it was after the last power of two of switches: what comes there again goes round until ROUNDS are over.
+    codes_then, x_then, n_then, then = codes, x, n, 0
     while True:
+        if then > 0 and codes == codes_then and x == x_then and n == n_then:
+            switches += (ROUNDS - switches) // (switches - then) * (switches - then)
+        if switches > 0 and switches >= 2 * then:
+            codes_then, x_then, n_then, then = codes, x, n, switches
         code_f, code_g = codes
         f = feature_of(store, shell_f, code_f)
         g = feature_of(store, shell_g, code_g)
