@@ -235,7 +235,22 @@ def approximated(
         begins, ends, stack = begins[order], ends[order], stack[order]
     stack[1:, 0] = stack[:-1, -1]
     at = np.append(begins[:1], ends)
+    if counts is not None:
+        _smooth(stack, at, ~np.isin(at[1:-1], breaks))
     return spline(bezier.joined(stack), bezier.full_knots(at, _DEGREE), _DEGREE), worst
+
+
+def _smooth(stack: Array, at: Array, halved: NDArray[np.bool_]) -> None:
+    """Give pieces (n, degree + 1, d) one derivative where a stretch was halved: of short ones a deviation is a corner.
+
+    It is the mean of both, that of the longer piece with more weight, whose deviation is the smaller one.
+    """
+    lengths = np.diff(at)
+    k = np.flatnonzero(halved)
+    left, right = lengths[k, None], lengths[k + 1, None]
+    joint = stack[k, -1]
+    mean = (joint - stack[k, -2] + stack[k + 1, 1] - joint) / (left + right)
+    stack[k, -2], stack[k + 1, 1] = joint - left * mean, joint + right * mean
 
 
 @lru_cache(maxsize=1)
