@@ -219,7 +219,7 @@ def test_a_sharp_turn_is_followed_and_noise_is_not():
     # No corners where stretches were halved.
     spans, legs = np.diff(np.unique(made.knots))[:, None], np.diff(points, axis=0)
     out, into = legs[6:-1:7] / spans[:-1], legs[7::7] / spans[1:]
-    assert np.abs(into - out).max() < 1e-9 * np.abs(out).max()
+    assert (np.linalg.norm(into - out, axis=1) <= 1e-6 * np.linalg.norm(out, axis=1)).all()
     calls = []
 
     def noise(t):
