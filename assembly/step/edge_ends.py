@@ -13,6 +13,9 @@ __all__ = [
     "FOLLOWED",
     "FREE",
     "LEVEL",
+    "LOOSE",
+    "POINT",
+    "TIGHT",
     "UNKNOWN",
     "U_LEVEL",
     "V_LEVEL",
@@ -25,6 +28,8 @@ __all__ = [
 UNKNOWN, FREE, U_LEVEL, V_LEVEL, FOLLOWED = range(5)
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
+# How certain ends of an edge are: most, less as it has a tolerance of its own, not at all as it is one point in space.
+TIGHT, LOOSE, POINT = range(3)
 # An edge on a face, run with the material on its left.
 EDGE = record_dtype(
     "f8",
@@ -36,7 +41,7 @@ EDGE = record_dtype(
     level=1,  # one of the numbers above
     line=1,  # 1: a straight line; 0: a curve that is kept elsewhere
     reverse=1,  # 1: a line that is to be turned; 0: it runs as it should
-    loose=1,  # 1: it has a tolerance of its own, so its ends are less certain than those of others
+    loose=1,  # one of the numbers below
     seam=1,  # 1: the face has it on both sides
 )
 EDGE_SIZE = size_of(EDGE)
@@ -108,7 +113,8 @@ def _keeps(edge, axis):
 def join_ends(rows, periods, noise, shifts, before, joints):
     """Move edges by periods next to the one before, and find where each meets that.
 
-    If one of the two alone is loose, they meet at the end of the other one. Else in the middle between both ends,
+    If one of the two is less certain, they meet at the end of the other one; a line along a pole keeps that it is
+    there. Else in the middle between both ends,
     except that an edge along a coordinate line keeps its coordinate.
 
     Parameters
@@ -153,8 +159,10 @@ def join_ends(rows, periods, noise, shifts, before, joints):
             b = other.end[axis] + (shifts[n, axis] if k == 0 else 0.0)
             before[k, axis] = b
             is_near = is_near and abs(b - a) <= noise[axis]
-            if other.loose != edge.loose:
-                joints[k, axis] = b if edge.loose != 0.0 else a
+            if other.loose == POINT and _keeps(other, axis) or edge.loose == POINT and _keeps(edge, axis):
+                joints[k, axis] = b if other.loose == POINT else a
+            elif other.loose != edge.loose:
+                joints[k, axis] = b if edge.loose > other.loose else a
             elif _keeps(other, axis) == _keeps(edge, axis):
                 joints[k, axis] = 0.5 * (b + a)
             else:

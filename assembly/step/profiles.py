@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import AssemblyError
 from assembly.geometry.splines import bezier
+from assembly.geometry.splines.curve_parts import CORNER
 from assembly.step.occt import occt
 
 __all__ = [
@@ -235,7 +236,24 @@ def approximated(
         begins, ends, stack = begins[order], ends[order], stack[order]
     stack[1:, 0] = stack[:-1, -1]
     at = np.append(begins[:1], ends)
+    if counts is not None:
+        _smooth(stack, at, ~np.isin(at[1:-1], breaks))
     return spline(bezier.joined(stack), bezier.full_knots(at, _DEGREE), _DEGREE), worst
+
+
+def _smooth(stack: Array, at: Array, halved: NDArray[np.bool_]) -> None:
+    """Give pieces (n, degree + 1, d) one derivative where a stretch was halved and the derivatives make a corner.
+
+    Of short pieces a small deviation does. It is the mean of both, that of the longer piece with more weight, whose
+    deviation is the smaller one.
+    """
+    lengths = np.diff(at)[:, None]
+    before, after = stack[:-1, -1] - stack[:-1, -2], stack[1:, 1] - stack[1:, 0]
+    mean = (before + after) / (lengths[:-1] + lengths[1:])
+    jump = np.linalg.norm(after / lengths[1:] - before / lengths[:-1], axis=1)
+    k = np.flatnonzero(halved & (jump > CORNER * np.linalg.norm(mean, axis=1)))
+    joint = stack[k, -1]
+    stack[k, -2], stack[k + 1, 1] = joint - lengths[k] * mean[k], joint + lengths[k + 1] * mean[k]
 
 
 @lru_cache(maxsize=1)

@@ -17,7 +17,20 @@ from assembly._record import place_of
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
-from assembly.step.edge_ends import EDGE, EDGE_SIZE, FOLLOWED, FREE, LEVEL, U_LEVEL, UNKNOWN, V_LEVEL, level_lines
+from assembly.step.edge_ends import (
+    EDGE,
+    EDGE_SIZE,
+    FOLLOWED,
+    FREE,
+    LEVEL,
+    LOOSE,
+    POINT,
+    TIGHT,
+    U_LEVEL,
+    UNKNOWN,
+    V_LEVEL,
+    level_lines,
+)
 from assembly.step.edges import Edges, Known
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
@@ -212,6 +225,7 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
     curves: list[Spline | None] = []
     names = []
     known_of, forgiven = edges.known, edges.forgiven
+    is_point = occt().BRep_Tool.Degenerated_s if patch.surface._pole_bits else None
     for traced in wire.edges:
         edge, _, low, high, line, seam = traced
         known = known_of(edge)
@@ -220,11 +234,12 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
             draft, known = _best(traced, known, wire, patch, edges)
             deviation = max(deviation, draft.deviation)
             ends, kept = _row(draft, is_turned)
-            rows.append((*ends[:6], tolerance, *ends[7:], known.loose, seam))
+            rows.append((*ends[:6], tolerance, *ends[7:], LOOSE if known.loose else TIGHT, seam))
             curves.append(kept)
         else:
             (u, v), (x, y) = line
-            rows.append((u, v, x, y, low, high, tolerance, UNKNOWN, 1.0, is_turned, False, seam))
+            certain = POINT if is_point is not None and is_point(edge) else TIGHT
+            rows.append((u, v, x, y, low, high, tolerance, UNKNOWN, 1.0, is_turned, certain, seam))
             curves.append(None)
         names.append(known.name)
         seams = seams or seam
@@ -235,7 +250,7 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
             draft, known = _best(traced, edges.known(traced.edge), wire, patch, edges)
             deviation = max(deviation, draft.deviation)
             ends, curves[k] = _row(draft, traced.edge.Orientation() == turned)
-            table[k] = (*ends[:6], table[k, TOLERANCE], *ends[7:], known.loose, traced.seam)
+            table[k] = (*ends[:6], table[k, TOLERANCE], *ends[7:], LOOSE if known.loose else TIGHT, traced.seam)
     if not patch.is_straight:
         # Ends of all lines are mapped at once.
         lines = table[:, _LINE] != 0.0

@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import place_of
 from assembly.geometry.seams.region_cuts import cut_open, part_of
 from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Uncut
 from assembly.geometry.seams.region_strips import strip
 from assembly.geometry.splines.bezier import full_knots
+from assembly.step import edge_ends
 from assembly.step.chains import chained
-from assembly.step.edge_ends import FREE, U_LEVEL, V_LEVEL
+from assembly.step.edge_ends import EDGE_SIZE, FREE, LOOSE, POINT, U_LEVEL, V_LEVEL, join_ends
 from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Drawn, curves_of, moved
+from assembly.step.trims import HIGH, LOW, Drawn, curves_of, moved
 
 
 def circle(center, radius, clockwise=False):
@@ -213,7 +215,11 @@ def test_a_sharp_turn_is_followed_and_noise_is_not():
     points, _ = made.cartesian
     t = np.concatenate([-np.geomspace(1e-9, 1.0, 3000), np.geomspace(1e-9, 1.0, 3000)])
     turn, far = asm.NurbsCurve(points, made.knots, made.degree).evaluate(t).T
-    assert np.abs(np.column_stack([far * np.cos(turn) - 1e-6, far * np.sin(turn) - t])).max() < 2e-10
+    assert np.abs(np.column_stack([far * np.cos(turn) - 1e-6, far * np.sin(turn) - t])).max() < 4e-10
+    # No corners where stretches were halved.
+    spans, legs = np.diff(np.unique(made.knots))[:, None], np.diff(points, axis=0)
+    out, into = legs[6:-1:7] / spans[:-1], legs[7::7] / spans[1:]
+    assert (np.linalg.norm(into - out, axis=1) <= 1e-6 * np.linalg.norm(out, axis=1)).all()
     calls = []
 
     def noise(t):
@@ -244,6 +250,19 @@ def test_an_end_that_turns_around_a_pole_moves_nothing_far_from_it(end):
     both = [sphere.evaluate(*curve.evaluate(t).T) for curve in curves]
     # The end itself moves by 6e-7.
     assert np.abs(both[1] - both[0]).max() < 1e-5
+
+
+def test_a_line_along_a_pole_begins_where_a_loose_edge_comes_in():
+    rows = np.zeros((2, EDGE_SIZE))
+    rows[:, LOW : HIGH + 1] = 0.0, 1.0
+    # A loose edge up to the pole at v = 3, and the line along that, whose u is off.
+    rows[0, :4] = 1.0, 0.0, 1.5, 2.9999
+    rows[1, :4] = 4.0, 3.0, 1.0, 3.0
+    rows[:, place_of(edge_ends.EDGE, "level")] = FREE, V_LEVEL
+    rows[:, place_of(edge_ends.EDGE, "loose")] = LOOSE, POINT
+    joints = np.empty((2, 2))
+    assert join_ends(rows, np.zeros(2), np.full(2, 1e-12), np.empty((3, 2)), np.empty((2, 2)), joints) > 0
+    np.testing.assert_array_equal(joints[1], [1.5, 3.0])
 
 
 def test_both_sides_of_a_seam_end_at_the_same_places():
