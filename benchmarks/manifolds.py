@@ -14,6 +14,7 @@ from assembly.geometry.recognition.forms import Cylinder
 from assembly.kinematics.pose import Pose
 from assembly.proximity.manifolds.elementary_faces import elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import ON_BORDER, PLACES
+from assembly.proximity.manifolds.flat_pair import flat_rows
 from assembly.proximity.manifolds.records import ROW_SIZE
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
 from assembly.proximity.manifolds.round_manifolds import round_record
@@ -51,6 +52,22 @@ def _poses(height: float) -> tuple[Array, Array]:
     return np.ascontiguousarray(turns.reshape(POSES, 9)), shifts
 
 
+def _holding_bounds(plate: tuple[Face, ...], poses: tuple[Array, Array], rows: Array) -> int:
+    """At how many poses no point of the upper plate, over the lower one, is nearer to it than the bound."""
+    top, bottom = _facing(tuple(plate), 1.0), _facing(tuple(plate), -1.0)
+    x, y = np.meshgrid(np.linspace(-20.0, 20.0, 81), np.linspace(-15.0, 15.0, 61))
+    under = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -2.0)])
+    holding = 0
+    for turn, shift in zip(*poses, strict=True):
+        _, bound = flat_rows(
+            top.frame, top.segments, bottom.frame, bottom.segments, turn, shift, ON_BORDER * top.size, rows
+        )
+        points = under @ turn.reshape(3, 3).T + shift
+        over = (np.abs(points[:, :2]) <= (20.0, 15.0)).all(axis=1)
+        holding += bool(points[over, 2].min() - 2.0 >= bound)
+    return holding
+
+
 def run(quick: bool) -> dict[str, Any]:
     """Times an update of a manifold."""
     rows = np.empty((PLACES, ROW_SIZE))
@@ -70,6 +87,7 @@ def run(quick: bool) -> dict[str, Any]:
     a, b = asm.Body("a", plates["plates"], fixed=True), asm.Body("b", plates["plates"])
     above = Pose(), Pose(np.array([0.0, 0.0, 4.05]))
     calls["call"] = lambda: asm.proximity.contact_manifold(a.face("top"), b.face("bottom"), poses=above)
+    right = _holding_bounds(plates["rectangles"], (turns, shifts), rows)
     seconds = {row["who"]: row["seconds"] for row in compare(calls, repeats=5 if quick else 25)}
     return {
         "about": ABOUT,
@@ -78,5 +96,6 @@ def run(quick: bool) -> dict[str, Any]:
             figure("two plates with three holes, an update", "seconds", seconds["plates"] / POSES, reach=5e-6),
             figure("a shaft in its bore, an update", "seconds", seconds["bore"] / POSES, reach=1e-6),
             figure("two plates with three holes, a call from Python", "seconds", seconds["call"]),
+            figure("bounds of rectangles that no sampled gap is below", "count", right, of=POSES, reach=POSES),
         ],
     }

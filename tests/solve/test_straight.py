@@ -58,7 +58,7 @@ def clips():
 
 
 def straight_of(scene, begun):
-    return straight_from(begun, scene._scene, scene._packed, bool(scene._objectives))
+    return straight_from(begun, scene._scene, scene._packed)
 
 
 @pytest.mark.parametrize("make", [four_bar, gears, arm, clips])
@@ -180,7 +180,7 @@ class Interrupted(Exception):
     pass
 
 
-@pytest.mark.parametrize("at", ["reshape", "get_ident"])
+@pytest.mark.parametrize("at", ["reshape", "addressof", "get_ident"])
 def test_what_interrupts_the_lending_of_other_arrays_leaves_none_of_them_lent(monkeypatch, at):
     scene, change = four_bar()
     begun = scene.solve()
@@ -191,7 +191,7 @@ def test_what_interrupts_the_lending_of_other_arrays_leaves_none_of_them_lent(mo
     other = packed.twin()
     other.rows_pool[[place for _, place in other.driven_angles]] += 0.4
 
-    def interrupt():
+    def interrupt(*_):
         raise Interrupted
 
     class Arrays(tuple):
@@ -201,11 +201,12 @@ def test_what_interrupts_the_lending_of_other_arrays_leaves_none_of_them_lent(mo
     lent = workspace.arrays
     with monkeypatch.context() as patch:
         if at == "reshape":
-            workspace.arrays = Arrays(lent)
+            # As on another thread, where all arrays are lent anew.
+            workspace.arrays, workspace._thread = Arrays(lent), 0
         else:
-            patch.setattr("assembly.solve.workspace.get_ident", interrupt)
+            patch.setattr(f"assembly.solve.workspace.{at}", interrupt)
         with pytest.raises(Interrupted):
-            workspace.go_on(other, False, begun._state.copy())
+            workspace.go_on(other, begun._state.copy())
     workspace.arrays = lent
     # The first scene has the workspace as well: it solves its own numbers, not the other's.
     np.testing.assert_array_equal(scene.solve(begun).q, before.q)
