@@ -28,12 +28,12 @@ def rows_of(folder):
 
 
 def test_a_study_goes_on_where_it_was_stopped(tmp_path):
-    stopped = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=0.02, progress=lambda done, total: done > 100)
+    stopped = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=1e-4, progress=lambda done, total: done > 100)
     kept = rows_of(tmp_path)
     assert 100 < len(kept) < ROWS and len(set(kept)) == len(kept)
     assert (stopped.table["status"] != "NOT_DONE").sum() == len(kept)
     said = []
-    resumed = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=0.02, progress=lambda *args: said.append(args))
+    resumed = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=1e-4, progress=lambda *args: said.append(args))
     assert said[0] == (len(kept), ROWS) and sorted(rows_of(tmp_path)) == list(range(ROWS))
     assert columns(resumed) == columns(asm.study(*narrow(ROWS)))
 
@@ -55,7 +55,7 @@ def test_a_folder_is_of_one_study(tmp_path):
 
 
 def test_damaged_parts_are_computed_again(tmp_path):
-    whole = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=0.05)
+    whole = asm.study(*narrow(ROWS), folder=tmp_path, chunk_seconds=1e-4)
     parts = sorted(tmp_path.glob("part-*.jsonl"))
     assert len(parts) > 3
     parts[1].write_text(parts[1].read_text()[:-30])
