@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from tests.solve.long_arm import long_arm
 
 # Public functions of a scene that take no turn in its whole length, and why.
+# Of an arm whose solve takes several times the 50 ms between callbacks.
+LINKS = 150
 OF_THEIR_OWN = {
     "interference": "reads bodies and poses alone",
     "study": "takes it until workers have what they need, or to its end in this process",
@@ -208,16 +211,6 @@ def test_a_scene_may_be_named():
         asm.follow()
 
 
-def long_arm(links=150):
-    """A chain that is drawn to the other side of its base: a solve of several times the 50 ms between callbacks."""
-    bodies = [asm.Body("ground", fixed=True), *(asm.Body(f"link {k}", position=(k, 0, 0)) for k in range(links))]
-    scene = asm.Assembly(bodies)
-    for k, (a, b) in enumerate(zip(bodies, bodies[1:], strict=False)):
-        scene.constrain(asm.Revolute(a.frame(at=(float(k > 0), 0, 0)), b.frame(), f"hinge {k}"))
-    scene.minimize(asm.PointDistance(bodies[-1].point(1, 0, 0), target=(-0.3 * links, 0.5 * links, 0.0)))
-    return scene
-
-
 def callback_that(act):
     """A callback of a solve that acts once."""
     acted = []
@@ -232,7 +225,7 @@ def callback_that(act):
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_callbacks_that_solve_each_others_scenes_do_not_wait_for_ever(count):
-    scenes = [long_arm() for _ in range(count)]
+    scenes = [long_arm(LINKS) for _ in range(count)]
     expected = scenes[0].solve(max_iterations=10_000).q
     starts = [scene.solve(max_iterations=1) for scene in scenes]
     inside = Barrier(count)
@@ -252,11 +245,11 @@ def test_callbacks_that_solve_each_others_scenes_do_not_wait_for_ever(count):
     for k in range(count):
         np.testing.assert_array_equal(outer[k], expected)
         np.testing.assert_array_equal(found[k][0], expected)
-        assert found[k][1:] == (150, 150)
+        assert found[k][1:] == (LINKS, LINKS)
 
 
 def test_a_callback_that_asks_for_its_own_scene_is_given_a_copy():
-    scene, found = long_arm(), []
+    scene, found = long_arm(LINKS), []
     expected, dof = scene.solve(max_iterations=10_000).q, scene.mobility().dof
 
     def act():
@@ -270,7 +263,7 @@ def test_a_callback_that_asks_for_its_own_scene_is_given_a_copy():
 
 
 def test_who_waits_gets_the_turn_and_a_callback_waits_for_another_scene():
-    scene, other = long_arm(), long_arm()
+    scene, other = long_arm(LINKS), long_arm(LINKS)
     expected, held, found = other.solve(max_iterations=10_000).q, Event(), []
 
     def hold():
@@ -291,7 +284,7 @@ def test_who_waits_gets_the_turn_and_a_callback_waits_for_another_scene():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_process_forked_while_a_thread_solves_can_solve():
-    scene, ends = long_arm(), Event()
+    scene, ends = long_arm(LINKS), Event()
     expected = scene.solve(max_iterations=10_000).q
     inside = Event()
     ball, cube = asm.Body("ball", asm.shapes.sphere(1.0)), asm.Body("cube", asm.shapes.box(1, 1, 1), position=(3, 0, 0))
@@ -324,7 +317,7 @@ def test_a_process_forked_while_a_thread_solves_can_solve():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_who_forks_in_a_callback_goes_on_in_both_processes():
-    scene, children = long_arm(), []
+    scene, children = long_arm(LINKS), []
     expected = scene.solve(max_iterations=10_000).q
 
     def act():
