@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assembly._record import rows_of
-from assembly.proximity.manifolds.clip import is_within
-from assembly.proximity.manifolds.records import SEGMENT
+from assembly.proximity.manifolds.clip import is_within, write_boxes
+from assembly.proximity.manifolds.records import SEGMENT, SEGMENT_SIZE
 from assembly.proximity.manifolds.regions import plane_region
 from tests.proximity.manifolds.plane_faces import plane_faces
 
@@ -68,3 +68,33 @@ def test_borders_are_within_by_a_tolerance(number, tolerance):
         corners = places(s)[1:-1:7]
         moved = corners + rng.uniform(-0.35, 0.35, corners.shape) * tolerance
         assert all(is_within(region.segments, *point, tolerance) for point in moved)
+
+
+def disc(rng):
+    """Four arcs of a circle that begin at a random angle, either way around, and the circle's center and radius."""
+    segments = np.zeros((4, SEGMENT_SIZE))
+    rows = rows_of(SEGMENT, segments)
+    center, radius = rng.uniform(-1.0, 1.0, 2), rng.uniform(0.3, 1.0)
+    turns = rng.uniform(0.0, 2.0 * np.pi) + rng.choice([-0.5, 0.5]) * np.pi * np.arange(5)
+    corners = center + radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    rows.begin, rows.end, rows.center, rows.radius = corners[:-1], corners[1:], center, radius
+    rows.sweep = np.diff(turns)
+    write_boxes(segments)
+    return segments, center, radius
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_arcs_that_bulge_along_the_axes(seed):
+    """Where they begin at a multiple of a right angle, as above, ends are farthest out, and no box needs its margin."""
+    rng = np.random.default_rng(seed)
+    segments, center, radius = disc(rng)
+    for s in rows_of(SEGMENT, segments):
+        points = places(s)
+        assert (points >= s.low - 1e-15).all() and (points <= s.high + 1e-15).all()
+    points = rng.uniform(-2.0, 2.0, (200, 2))
+    turns = rng.uniform(0.0, 2.0 * np.pi, 200)
+    near = center + radius * (1.0 + rng.choice([-1e-9, 1e-9], 200))[:, None] * np.column_stack(
+        [np.cos(turns), np.sin(turns)]
+    )
+    for point in np.vstack([points, near]):
+        assert is_within(segments, *point, 1e-12) == (np.linalg.norm(point - center) < radius)
