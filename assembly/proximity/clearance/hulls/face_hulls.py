@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.hulls.flat_hulls import hulls_of_flat
 from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Tube, parts_of_one
+from assembly.proximity.clearance.hulls.looped_part import looped_part
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 from assembly.proximity.manifolds.flat_map import FlatMap, flat_map
 
@@ -42,11 +44,12 @@ def hulls_of_face(face: Face) -> list[FaceHulls]:
     if isinstance(form, Plane):
         net = surface.control_points.reshape(-1, 3)
         return [FaceHulls([(Discs.of_points(net), 0.0)], [], points, form.normal, None)]
-    around, line, hollows = _of_form(form), _line_of(form), _hollow(form, face)
+    part = looped_part(face)
+    around, line, hollows = _of_form(form, part), _line_of(form), _hollow(form, face)
     known = hollows, points, _axis_of(form), line
     if around is not None and _is_all_around(form):
         return [FaceHulls([around], hollows, points, _axis_of(form), line)]
-    spans = surface.bezier_pieces()
+    spans = part.bezier_pieces()
     parts = spans.reshape(-1, spans.shape[2] * spans.shape[3], 4)
     if len(parts) > SPANS:
         parts = parts.reshape(1, -1, 4)
@@ -59,15 +62,16 @@ def _is_all_around(form: Form) -> bool:
     return isinstance(form, (Cylinder, Cone)) and form.turn.angle >= AROUND
 
 
-def _of_form(form: Form) -> tuple[Discs, float] | None:
-    """The hull of all of a cylinder, a cone, a sphere or a torus, between its heights."""
+def _of_form(form: Form, part: NurbsSurface) -> tuple[Discs, float] | None:
+    """The hull of all of a sphere or a torus, or of a cylinder or a cone between the heights of a part of it."""
     if isinstance(form, Sphere):
         return Discs.of_points(form.center[None]), form.radius + form.deviation
     if isinstance(form, Torus):
         return Discs(form.center[None], form.axis[None], np.array([form.major])), form.minor + form.deviation
     if isinstance(form, (Cylinder, Cone)):
         foot = form.point if isinstance(form, Cylinder) else form.apex
-        heights = np.array(form.heights)
+        along = (part.control_points - foot) @ form.axis
+        heights = np.array([max(form.heights[0], along.min()), min(form.heights[1], along.max())])
         radii = np.full(2, form.radius) if isinstance(form, Cylinder) else heights * tan(form.half_angle)
         return Discs(foot + heights[:, None] * form.axis, np.tile(form.axis, (2, 1)), radii), form.deviation
     return None

@@ -72,10 +72,14 @@ class Hollow(NamedTuple):
             beside = np.sqrt(((away - height[:, None] * discs.axes) ** 2).sum(axis=1))
             return np.asarray(self.radius - np.hypot(beside + discs.radii, height))
         height = away @ self.axis
-        beside = np.sqrt(((away - height[:, None] * self.axis) ** 2).sum(axis=1))
+        off = away - height[:, None] * self.axis
+        beside = np.sqrt((off**2).sum(axis=1))
         lean = discs.axes - (discs.axes @ self.axis)[:, None] * self.axis
         lowest = height - discs.radii * np.sqrt((lean**2).sum(axis=1))
-        inside = (self.radius - beside - discs.radii) * cos(self.slope)
+        # A disc whose axis leads away from this one is nowhere farther off than by its radius across.
+        sideways = np.sqrt(((off - (off * discs.axes).sum(axis=1)[:, None] * discs.axes) ** 2).sum(axis=1))
+        farthest = np.sqrt(beside**2 + (2.0 * sideways + discs.radii) * discs.radii)
+        inside = (self.radius - farthest) * cos(self.slope)
         return np.asarray(inside + lowest * sin(self.slope))
 
     def depth_of(self, points: Array) -> Array:

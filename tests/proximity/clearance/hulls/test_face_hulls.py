@@ -42,7 +42,34 @@ def slotted():
     return asm.shapes.extrusion(polygon([(-20, -10), (20, -10), (20, 10), (-20, 10)]), 6.0, [loop])
 
 
+def ring(surface, v, up=True):
+    """A loop once around a surface that is closed in u; material is above it, or below."""
+    ends = [(side, v) for side in surface.domain[0]]
+    return polygon(ends if up else ends[::-1])[:1]
+
+
+def window(surface, u, v):
+    """A face that is a rectangle of its surface."""
+    corners = [(u[0], v[0]), (u[1], v[0]), (u[1], v[1]), (u[0], v[1])]
+    return asm.Face(surface, polygon(corners), name="window")
+
+
+def band(surface, low, high):
+    """A face between two rings of a surface."""
+    return asm.Face(surface, ring(surface, low), [ring(surface, high, up=False)], name="band")
+
+
+WALL, CONE, BALL = asm.shapes.cylinder(4, 40), asm.shapes.cone(6, 12, 2), asm.shapes.sphere(5)
+FILLET = asm.shapes.revolution(asm.NurbsCurve([(3, -8), (3, 8)], [0, 0, 16, 16], 1), 1.2)
+# Faces whose surfaces reach beyond them, as those of files do.
+LOOPED = {
+    "wall": (band(WALL, WALL.domain[1][0] + 7.0, WALL.domain[1][0] + 11.0),),
+    "cone": (band(CONE, CONE.domain[1][0] + 3.0, CONE.domain[1][0] + 5.0),),
+    "cap": (asm.Face(BALL, ring(BALL, BALL.domain[1][0] + 12.0), name="cap"),),
+    "fillet": (window(FILLET, (0.5, 1.5), (3.0, 7.0)),),
+}
 SHAPES = {
+    **LOOPED,
     "plate": asm.shapes.plate(60, 40, 10, [(0, 0, 4.5), (10, 5, 2.0)]),
     "pin": asm.shapes.solid_cylinder(4, 40),
     "bolt": bolt(4, 30, 6.5, 8),
@@ -57,11 +84,17 @@ SHAPES = {
 
 
 def samples(face):
-    """Points of a face, on a grid."""
+    """Points of a face, on a grid, and on its loops."""
     (u0, u1), (v0, v1) = face.surface.domain
     u, v = (grid.ravel() for grid in np.meshgrid(np.linspace(u0, u1, 23), np.linspace(v0, v1, 23)))
     mine = face.contains(u, v)
-    return face.surface.evaluate(u[mine], v[mine])
+    return np.concatenate([face.surface.evaluate(u[mine], v[mine]), samples_of_loops(face)])
+
+
+def samples_of_loops(face):
+    """Points of a face's boundary, none where it has none."""
+    at = [np.empty((0, 2)), *(curve.evaluate(np.linspace(*curve.domain, 9)) for curve in face.boundary)]
+    return face.surface.evaluate(*np.concatenate(at).T)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -76,6 +109,20 @@ def test_a_face_is_within_its_hulls(name):
         assert within.any(axis=0).all(), face
         # And no hull is much larger: along one of these at least a part ends where the face does.
         assert (reach.max(axis=0) - (points @ normals.T).max(axis=0)).min() < 1e-9, face
+
+
+def test_a_face_reaches_no_farther_than_its_loops():
+    """Surfaces of files are longer than what loops leave: bodies seemed to be in each other."""
+    along = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+    for name in ("wall", "cone", "fillet"):
+        (face,) = faces_of(LOOPED[name])
+        ends = (samples_of_loops(face) @ along.T).max(axis=0)
+        assert np.abs(hulls_of_body((face,)).reach(along).max(axis=0) - ends).max() <= OFF, name
+    # A third of a radian of the fillet is no wider than its chord and what its control points are beyond.
+    turn = FILLET.evaluate(1.0, 5.0) * (1.0, 1.0, 0.0) / 3.0
+    ways = np.array([np.cross((0.0, 0.0, 1.0), turn), np.cross(turn, (0.0, 0.0, 1.0)), -turn])
+    wide = (FILLET.evaluate([0.5, 1.5], 5.0) @ ways.T).max(axis=0)
+    assert np.abs(hulls_of_body(LOOPED["fillet"]).reach(ways).max(axis=0) - wide).max() < 0.05
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -106,6 +153,13 @@ def test_points_are_of_the_face(name):
         assert (hulls.points @ normals.T <= hulls.reach(normals)[:, None] + OFF).all(axis=2).any(axis=0).all()
         for _, hollow in hulls.hollows:
             assert hollow.depth_of(hulls.points).max() <= OFF
+
+
+def test_a_pin_across_a_bore_is_within_it_as_far_as_its_rims():
+    """Discs whose axes lead away from the bore's count with what they are across, not with all of their radius."""
+    bore = Hollow(np.array([0.5, 0.0, 3.0]), np.array([0.0, 0.0, 1.0]), 25.0)
+    pin = Discs(np.array([[22.5, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]]), np.array([6.0]))
+    assert abs(bore.depth(pin)[0] - (25.0 - np.hypot(22.0, 6.0))) < 1e-14
 
 
 @pytest.mark.parametrize(
