@@ -143,14 +143,16 @@ def hull_answers(packed: Packed, bodies: Sequence[Body], q: Array, touching: flo
     whatever was solved before.
     """
     shapes, pairs, minimum = proven_pairs(packed, bodies)
-    asked = q.tobytes() + np.array([touching, *minimum]).tobytes()
+    lengths = np.array([touching, *minimum]).tobytes()
+    asked = q.tobytes() + lengths
     # Read once: other threads may solve the scene.
     known = packed.hulled
     for key, told in known:
         if key == asked:
             return cast(HullAnswers, told)
     is_silent = any(is_of_wires(shapes[a]) and is_of_wires(shapes[b]) for a, b in pairs)
-    found = HullAnswers(shapes, pairs, minimum, q.copy(), touching, is_silent)
+    last = known[0][1] if known and known[0][0].endswith(lengths) else None
+    found = HullAnswers(shapes, pairs, minimum, q.copy(), touching, is_silent, last)
     packed.hulled = ((asked, found), *known[: REMEMBERED - 1])
     return found
 

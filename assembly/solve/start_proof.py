@@ -6,7 +6,7 @@ otherwise from what a look leaves open. If all that fails, contacts of the loop 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.features.solid_contact import TRACK
@@ -67,18 +68,16 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     if stood is not None and stood[:2] == (asked, touching):
         return stood[2]
     # Hulls of faces prove most of it before there are cells, and of faces that lie on each other in less time.
-    hulls = hull_answers(packed, bodies, q, touching * packed.scale)
-    hulled = hulls.all_held()
-    if hulled is not None:
-        found = named_answers(packed, hulled)
-        packed.stood = asked, touching, found
+    found = _told_by_hulls(packed, bodies, state, touching)
+    if found is not None:
         return found
+    hulls = hull_answers(packed, bodies, q, touching * packed.scale)
     if hulls.any_crosses():
         packed.stood = asked, touching, None
         return None
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(touching * packed.scale)
-        answers, conforming = _answers(proof, q, touching * packed.scale)
+        answers, conforming = _answers(proof, q, touching * packed.scale, hulls.told())
     if answers is None:
         packed.stood = asked, touching, None
         return None
@@ -91,6 +90,19 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
             return None
     found = named_answers(packed, answers)
     packed.stood = asked, touching, found
+    return found
+
+
+def _told_by_hulls(
+    packed: Packed, bodies: Sequence[Body], state: Array, touching: float
+) -> Sequence[PairAnswer] | None:
+    """What is proven where hulls of faces tell that all pairs hold; None where they do not."""
+    q = state[: packed.contacts_at].reshape(-1, 7)
+    hulled = hull_answers(packed, bodies, q, touching * packed.scale).all_held()
+    if hulled is None:
+        return None
+    found = named_answers(packed, hulled)
+    packed.stood = _asked(packed, state), touching, found
     return found
 
 
@@ -142,19 +154,37 @@ def prove_way(
                 return None
         if not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
             if may_jump:
+                # Where no look proved the last way, none is likely to prove this one, and hulls tell in less time.
+                if proof.has_jumped and _is_short_or_clear(proof, last, q, hull_answers(packed, bodies, last, length)):
+                    found = _told_by_hulls(packed, bodies, state, touching)
+                    if found is not None:
+                        return found
                 # Hulls may have told of the last poses: what opens faces that touch there is not known yet.
-                _answers(proof, last, length)
+                _answers(proof, last, length, {})
             else:
                 proof.look_from(last, length)
         if proof.stays_clear(q, length, proof.moves, QUICK):
             found = StayedClear(packed, *proof.clear_bounds(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
+            proof.has_jumped = False
             return found
         if not may_jump:
             return None
         if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):
             return None
+        proof.has_jumped = True
     return prove_start(packed, bodies, state, touching)
+
+
+def _is_short_or_clear(proof: ClearanceProof, last: Array, q: Array, told: HullAnswers) -> bool:
+    """Whether ways are shorter than what is round or thin of a pair, or than how far it was apart at the last poses."""
+    for k in range(len(proof.pairs)):
+        way = proof.way_length(k, last, q)
+        if way > proof.radius(k):
+            answer = told.held(k)
+            if answer is None or answer.bound - way <= proof.minimum[k]:
+                return False
+    return True
 
 
 def _unproven_ways(proof: ClearanceProof, q: Array, touching: float) -> list[int]:
@@ -168,11 +198,16 @@ def _unproven_ways(proof: ClearanceProof, q: Array, touching: float) -> list[int
     return [k for k in proof.not_clear() if k not in proven]
 
 
-def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Answer] | None, list[int]]:
-    """What is proven of all pairs, and those which samples are to tell of; None where any crosses, or may."""
-    moves, conforming = _opening(proof, q, touching)
-    asked = [k for k in range(len(proof.pairs)) if k not in conforming]
-    answers = [Answer(Verdict.UNDECIDED)] * len(proof.pairs)
+def _answers(
+    proof: ClearanceProof, q: Array, touching: float, told: Mapping[int, Answer]
+) -> tuple[list[Answer] | None, list[int]]:
+    """What is proven of all pairs, and those which samples are to tell of; None where any crosses, or may.
+
+    Pairs that are told already are not looked at.
+    """
+    moves, conforming = _opening(proof, q, touching, told)
+    asked = [k for k in range(len(proof.pairs)) if k not in conforming and k not in told]
+    answers = [told.get(k, Answer(Verdict.UNDECIDED)) for k in range(len(proof.pairs))]
     for k, answer in zip(asked, proof.look(q, touching, moves, which=asked), strict=True):
         answers[k] = answer
     if any(answer.verdict in CROSSED for answer in answers):
@@ -198,7 +233,7 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
     return answers, left
 
 
-def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, set[int]]:
+def _opening(proof: ClearanceProof, q: Array, touching: float, told: Mapping[int, Answer]) -> tuple[Array, set[int]]:
     """Of every pair a move (6) that opens it where flat faces touch, and the pairs that none opens.
 
     What opened contacts before may do so here.
@@ -206,7 +241,7 @@ def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, s
     moves, hopeless = proof.moves.copy(), set()
     for k in proof.near_pairs(q, touching):
         # Wires that touch are slimmer instead.
-        if moves[k].any() or proof.is_of_wires(k):
+        if k in told or moves[k].any() or proof.is_of_wires(k):
             continue
         off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
         if off is None:

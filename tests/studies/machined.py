@@ -51,6 +51,14 @@ def socket(radius, outer, depth):
     return [*faces, asm.Face(revolved(*profile, 2.0 * np.pi, 4), name="cavity", reversed=True)]
 
 
+def retaining_ring(radius, outer, angle):
+    """A ring that holds a ball in its socket, from the ball's equator up to an angle of latitude."""
+    high, hole = radius * np.sin(angle), radius * np.cos(angle)
+    faces = turned_part([(radius, 0), (outer, 0), (outer, high), (hole, high)])[:3]
+    profile = circle_profile((0.0, 0.0), radius, 0.0, angle, 1)
+    return [*faces, asm.Face(revolved(*profile, 2.0 * np.pi, 4), name="seat", reversed=True)]
+
+
 def disturbed(rng, pose, way, angle):
     """A pose (7,) moved by a way in any direction and turned about any axis."""
     axis, along = rng.normal(size=(2, 3))

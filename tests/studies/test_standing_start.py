@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.geometry.shapes.plane_curves import circle
+from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.interruption import CTRL_C
 from assembly.studies.first_solve import first_solve
 from tests.studies.machined import bolt, socket
@@ -244,3 +246,25 @@ def test_of_several_starts_each_is_measured_from_the_bodies():
 def test_callbacks_and_limits_end_nothing_that_holds():
     solution = flush_plates().solve(time_limit=60.0, callback=lambda *_: None)
     assert solution.success and solution.proved
+
+
+def test_only_pairs_of_which_hulls_do_not_tell_are_looked_at(monkeypatch):
+    """One pair that they leave open had all others looked at, and of some it was not proven what hulls told."""
+    arch = asm.shapes.revolution(circle(2.0, (10.0, 0.0)), 1.5 * np.pi)
+    bodies = [
+        asm.Body("floor", asm.shapes.plate(60, 60, 10, [(0, 0, 4.0)]), fixed=True),
+        asm.Body("pin", asm.shapes.solid_cylinder(4.0, 30), position=(0, 0, 8)),
+        asm.Body("arch", arch, position=(0, 0, 12)),
+        asm.Body("block", asm.shapes.box(10, 10, 10), position=(20, 20, 10)),
+    ]
+    scene, looked, look = asm.Assembly(bodies), set(), ClearanceProof.look
+    scene.constrain(asm.Clearance())
+
+    def seen(proof, q, touching, moves=None, which=None, *args, **more):
+        looked.update(proof.pairs[k] for k in (range(len(proof.pairs)) if which is None else which))
+        return look(proof, q, touching, moves, which, *args, **more)
+
+    monkeypatch.setattr(ClearanceProof, "look", seen)
+    solution = scene.solve()
+    assert solution.iterations == 0 and solution.proved
+    assert looked == {(1, 2)} or looked == {(2, 1)}

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.studies import unhindered as module
+from tests.studies.machined import turned_part
 
 
 def slider():
@@ -149,3 +151,36 @@ def test_nothing_is_known_of_the_way_from_a_solve_that_failed(monkeypatch):
     drive.slide = 0.8
     assert scene.solve(failed).success and ends == [None]
     assert scene.solve(solution).success and ends[1] is not None
+
+
+def test_what_turns_in_its_seat_is_told_by_hulls_once_no_look_proves_its_way(monkeypatch):
+    """Each step looked at the last pose and at the way in vain, before hulls told of its end."""
+    root = 3**0.5
+    seat = asm.Body("seat", turned_part([(5, -5 * root), (25, -5 * root), (25, 0), (10, 0)]), fixed=True)
+    plug = asm.Body("plug", turned_part([(0, -4 * root), (6, -4 * root), (12, 2 * root), (0, 2 * root)]))
+    spin, scene, looks = asm.Revolute(seat.frame(), plug.frame(), "spin", angle=0.0), asm.Assembly([seat, plug]), []
+    scene.constrain(spin, asm.Clearance())
+    solution, look = scene.solve(), ClearanceProof.look
+    monkeypatch.setattr(ClearanceProof, "look", lambda *asked, **more: looks.append(1) or look(*asked, **more))
+    for k in range(1, 7):
+        spin.angle = 0.08 * k
+        solution = scene.solve(solution)
+        assert solution.success and solution.proved and solution._lists is not None
+        if k == 2:
+            looks.clear()
+    assert not looks
+
+
+@pytest.mark.parametrize("way", [8.0, 40.0])
+def test_no_long_way_is_taken_for_a_short_one(way, monkeypatch):
+    """Behind a wall that it was flush with a block is clear again, whatever the last way was."""
+    monkeypatch.setattr(ClearanceProof, "has_jumped", property(lambda _: True, lambda *_: None), raising=False)
+    wall = asm.Body("wall", asm.shapes.box(2, 40, 40), fixed=True)
+    block = asm.Body("block", asm.shapes.box(4, 4, 4), position=(-3, 0, 0))
+    drive = asm.Prismatic(wall.frame(z=(1, 0, 0)), block.frame(z=(1, 0, 0)), "drive", slide=-3.0)
+    scene = asm.Assembly([wall, block])
+    scene.constrain(drive, asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution._lists is not None
+    drive.slide = way - 3.0
+    assert scene.solve(solution)._lists is None

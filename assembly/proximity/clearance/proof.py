@@ -61,6 +61,8 @@ class ClearanceProof(KeptLooks):
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
         self._stood: dict[tuple[bytes, float], list[Answer]] = {}
+        # Whether the last way of a solve was not proven, but short.
+        self.has_jumped = False
 
     def as_they_stand(self, q: Array, touching: float) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7); the last few poses are looked at once.

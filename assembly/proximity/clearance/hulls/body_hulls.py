@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Directions and axes of one body that are taken at most: of a body of very many faces others are not tried.
 MOST = 40
-# How far a cone may be beyond a hole that it goes through, in parts of the radius of that; its own is less by that.
+# How far a cone may be beyond a hole that it goes through, in parts of the radius of that, and a ball, in parts of its
+# own; its own is less by that.
 NEARLY = 1e-9
 
 
@@ -172,7 +173,7 @@ def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
 
 
 def _seats(face: FaceHulls, others: list[FaceHulls]) -> list[Hollow]:
-    """Cones of other faces that go through a round hole of a flat face: the face is beyond them as well."""
+    """Cones and balls of other faces that go through a round hole of a flat face: it is beyond them as well."""
     if face.direction is None or face.line is not None:
         return []
     found = []
@@ -186,6 +187,15 @@ def _seats(face: FaceHulls, others: list[FaceHulls]) -> list[Hollow]:
         beyond = off + cone.radius + height * tan(cone.slope) - hole.radius
         if cone.is_wall and height > 0.0 and beyond < NEARLY * hole.radius:
             found.append(cone._replace(radius=cone.radius - max(beyond, 0.0)))
+    balls = [ball for other in others for ball in other.hollows if isinstance(ball, Hollow) and not ball.axis.any()]
+    for hole, ball in product(holes, balls):
+        away = ball.center - hole.center
+        height = float(away @ hole.axis)
+        beside = hole.radius - float(np.linalg.norm(away - height * hole.axis))
+        # How far the plane is from the middle of the ball, outside of its hole.
+        off = float(np.hypot(height, max(beside, 0.0)))
+        if ball.is_wall and off > (1.0 - NEARLY) * ball.radius:
+            found.append(ball._replace(radius=min(ball.radius, off)))
     return found
 
 

@@ -38,6 +38,8 @@ class HullAnswers:
         How far a point of a body may be taken to have the gap so large; what crosses by no more is not told to cross.
     is_silent : bool
         Whether nothing is told of any pair.
+    last : HullAnswers, optional
+        Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here.
     """
 
     def __init__(
@@ -48,11 +50,16 @@ class HullAnswers:
         q: Array,
         touching: float,
         is_silent: bool = False,
+        last: HullAnswers | None = None,
     ) -> None:
         self._shapes, self._pairs, self._minimum = shapes, pairs, minimum
         self._q, self._touching, self._is_silent = q, touching, is_silent
         self._held: dict[int, Answer | None] = {}
         self._crossings: dict[int, Answer | None] = {}
+        if last is not None:
+            stayed = {k for k, pair in enumerate(pairs) if (q[[*pair]] == last._q[[*pair]]).all()}
+            for mine, theirs in ((self._held, last._held), (self._crossings, last._crossings)):
+                mine.update((k, answer) for k, answer in [*theirs.items()] if k in stayed)
 
     def held(self, k: int) -> Answer | None:
         """That a pair is clear or touches, or None where hulls do not tell it."""
@@ -108,8 +115,9 @@ class HullAnswers:
             middle[body] = self._turns[body] @ center + self._q[body, :3]
         a, b = np.array(self._pairs, dtype=np.int64).reshape(-1, 2).T
         apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
-        rounding = ROUNDING * (float(np.abs(middle).max(initial=0.0)) + radius.max(initial=0.0))
-        return np.asarray(apart - rounding)
+        # What is told of a pair is to depend on these two bodies alone.
+        far = np.abs(middle).max(axis=1) + radius
+        return np.asarray(apart - ROUNDING * np.maximum(far[a], far[b]))
 
     def _relative(self, k: int) -> tuple[Array, Array]:
         """Where the second body of a pair is in the axes of the first."""

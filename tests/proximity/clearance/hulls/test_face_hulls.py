@@ -12,7 +12,7 @@ from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism, Tube
 from assembly.proximity.clearance.hulls.triangles import triangles_of
 from tests.proximity.clearance.scenes import direction, faces_of
-from tests.studies.machined import bolt, socket, turned_part
+from tests.studies.machined import bolt, retaining_ring, socket, turned_part
 
 # Of coordinates of up to 60.
 OFF = 2e-12
@@ -141,6 +141,22 @@ def test_a_flat_face_is_beside_the_cone_that_goes_through_its_hole():
     assert len(cones) == 3
     for number, cone in cones:
         assert cone.depth_of(samples(faces[number])).max() <= 1e-8
+
+
+def test_a_flat_face_is_beside_the_ball_that_goes_through_its_hole():
+    def beside_balls(faces):
+        hulls = hulls_of_body(faces)
+        return [(faces[hulls.part_of[k]], hollow) for k, hollow in hulls.hollows if not hollow.axis.any()]
+
+    balls = beside_balls(faces_of(retaining_ring(12.0, 22.0, 0.6)))
+    # The seat itself, and both ends.
+    assert {face.name for face, _ in balls} == {"face 0", "face 2", "seat"}
+    for face, ball in balls:
+        assert ball.depth_of(samples(face)).max() <= 1e-8
+    # A ball that is wider than the holes does not go through them.
+    washer = faces_of(turned_part([(11.0, 0), (22.0, 0), (22.0, 3), (11.0, 3)]))
+    cavity = asm.Face(asm.shapes.sphere(12.0), name="cavity", reversed=True)
+    assert {face.name for face, _ in beside_balls((*washer, cavity))} == {"cavity"}
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -15,7 +15,7 @@ from assembly.proximity.clearance.hulls.pair import answer_by_hulls
 from assembly.proximity.clearance.hulls.scene import HullAnswers
 from tests.proximity.clearance.hulls.test_face_hulls import GROOVE, polygon, square_hole
 from tests.proximity.clearance.scenes import at, faces_of, poses, proof_of, start_of
-from tests.studies.machined import bolt, socket, turned_part
+from tests.studies.machined import bolt, retaining_ring, socket, turned_part
 from tests.validation import exact_solids as exact
 from tests.validation.crossing_judge import Motion, crossing_depth
 
@@ -45,6 +45,11 @@ FITS = {
     "a bore over its pin": lambda off: (asm.shapes.solid_cylinder(4 + off, 40), PLATE, at(0, 0, 4)),
     "a bolt on its plate": lambda off: (PLATE, bolt(4 + off, 30, 6.5, 8), at(0, 0, 5)),
     "a ball in its socket": lambda off: (socket(10, 18, 16), asm.shapes.sphere(10 + off), at(0, 0, 0)),
+    "a ball through its ring": lambda off: (
+        retaining_ring(12.0, 22.0, 0.6),
+        asm.shapes.sphere(12 + off),
+        at(0, 0, 0),
+    ),
     "a ball on a ring": lambda off: (asm.shapes.torus(5, 1.5), asm.shapes.sphere(5 + off), at(0, 0, ON_RING)),
     "a ring around a ball": lambda off: (asm.shapes.sphere(5 + off), asm.shapes.torus(5, 1.5), at(0, 0, ON_RING)),
     "a plug in its seat": lambda off: (*plug(2.0 * off), at(0, 0, 0)),
@@ -224,3 +229,20 @@ def test_a_pin_that_lies_along_the_wall_of_a_wider_bore_touches_it(angle):
     assert answer is not None and answer.verdict is Verdict.TOUCHING and answer.depth <= TOUCHING
     deeper = place + 1e-5 * np.array([np.cos(angle), np.sin(angle), 0.0])
     assert answer_by_hulls(plate, pin.posed(np.eye(3), deeper), 0.0, TOUCHING) is None
+
+
+def test_what_is_known_of_bodies_that_stay_is_what_is_told_of_them_anew():
+    """Answers are the same to the bit, and none is asked for again."""
+    plate, pin = faces_of(PLATE), faces_of(asm.shapes.solid_cylinder(4.0, 40))
+    shapes, pairs = [plate, pin, pin, plate], [(0, 1), (0, 2), (0, 3), (1, 2), (2, 3)]
+    q = np.array([at(0, 0, 0), at(0, 0, 4), at(0, 0, 60), at(5, 3, 10)])
+    first = HullAnswers(shapes, pairs, [0.0] * 5, q, TOUCHING)
+    for k in range(5):
+        first.held(k), first.crossing(k)
+    moved = q.copy()
+    moved[2, :3] = 30.0, 0.0, 1000.0
+    later, anew = (HullAnswers(shapes, pairs, [0.0] * 5, moved, TOUCHING, last=last) for last in (first, None))
+    assert [later.held(k) is first.held(k) for k in (0, 2)] == [True, True]
+    for k in range(5):
+        assert repr(later.held(k)) == repr(anew.held(k)) and repr(later.crossing(k)) == repr(anew.crossing(k))
+    assert later.held(1).bound > first.held(1).bound
