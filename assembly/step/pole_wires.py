@@ -68,6 +68,8 @@ def polar(wires: Sequence[Wire], surface: Any, face: Any) -> Polar | None:
     `face` is taken forward.
     """
     o = occt()
+    while isinstance(surface, o.Geom_RectangularTrimmedSurface):
+        surface = surface.BasisSurface()
     if not isinstance(surface, (o.Geom_SphericalSurface, o.Geom_ConicalSurface, o.Geom_SurfaceOfRevolution)):
         return None
     every = [traced for wire in wires for traced in wire.edges]
@@ -85,6 +87,7 @@ def polar(wires: Sequence[Wire], surface: Any, face: Any) -> Polar | None:
         _follow(row)
     if not _link(runs):
         return None
+    _meet_off_poles(runs, surface)
     loops = [_drawn(cycle, face, degenerated) for cycle in _cycles(runs)]
     if len(wires) == len(loops) == 1 and not degenerated and loops[0].turn == 0.0 and loops[0].area > 0.0:
         return None
@@ -165,6 +168,24 @@ def _link(runs: list[_Run]) -> bool:
         run.after = starts[int(np.argmin(ways))]
         taken.add(id(run.after))
     return True
+
+
+def _meet_off_poles(runs: Sequence[_Run], surface: Any) -> None:
+    """Take no vertex for a pole at which two edges come to one place of the surface that is off the pole.
+
+    OCCT draws a line along a pole there for many an edge that goes round the pole and crosses the seam, and gives the
+    vertex a tolerance that reaches the pole.
+    """
+    for run in runs:
+        after, pole = run.after, run.poles[1]
+        if after is None or pole is None:
+            continue
+        here, there = (np.array(surface.Value(*place).Coord()) for place in (run.places[-1], after.places[0]))
+        off = float(np.linalg.norm(here - pole.point))
+        turn = after.places[0, 0] - run.places[-1, 0]
+        turn -= TURN * round(turn / TURN)
+        if off > CONFUSION and abs(turn) < _TANGENT and np.linalg.norm(there - here) < _TANGENT * off:
+            run.poles, after.poles = (run.poles[0], None), (None, after.poles[1])
 
 
 def _way(run: _Run, after: _Run, pole: _Pole | None) -> float:

@@ -19,7 +19,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, Line, curve_form
 from assembly.geometry.recognition.nets import exactness
 from assembly.geometry.seams.region_cuts import cut_in_two, cut_open
-from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece
+from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece, begun_at_pole
 from assembly.geometry.seams.region_strips import area_of, corners_of, strip, winds
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
@@ -285,7 +285,8 @@ def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
     """
     region = region_of(face)
     surface, chains = cut_open(region)
-    found = [(surface, chains)]
+    # OCCT draws lines along poles itself, and gives up the seam of many a face whose wire begins elsewhere.
+    found = [(surface, [begun_at_pole(chain, surface) for chain in chains])]
     for axis in (0, 1):
         period = region.surface._periods[axis]
         if not period or surface.closed[axis]:
