@@ -27,7 +27,10 @@ EXACT = 1e-7
 
 @dataclass
 class Shape:
-    """Faces of one solid, or of one sheet, in the part's own coordinates."""
+    """Faces of one solid, or of one sheet, in the part's own coordinates.
+
+    `is_doubtful` says that OCCT has another part of the surface for one of them.
+    """
 
     faces: list[Face]
     color: Color | None
@@ -35,6 +38,7 @@ class Shape:
     missing: list[str]
     inexact: list[str]
     slits: list[str] = field(default_factory=list)
+    is_doubtful: bool = False
 
 
 class Unrepaired(AssemblyError):
@@ -105,6 +109,7 @@ def read_shape(
         names.append(unique(own or f"face {k}", taken))
         tints.append(tint)
     read = read_faces(faces, edges, names, scale)
+    made.is_doubtful = edges.is_doubtful
     for face, label, tint, one in zip(faces, names, tints, read, strict=True):
         if isinstance(one, Unreadable):
             if _is_slit(face):
@@ -125,7 +130,7 @@ def _outward(shape: Any, made: Shape) -> Shape:
     OCCT judges which side of a shell is outside by the faces as it reads them, and those with poles may be wrong.
     """
     o = occt()
-    if made.missing or shape.ShapeType() != o.TopAbs_SOLID or not any(face.surface._pole_bits for face in made.faces):
+    if not made.is_doubtful or made.missing or shape.ShapeType() != o.TopAbs_SOLID:
         return made
     if len(parts(shape, o.TopAbs_SHELL)) == 1 and sum(face.volume_integral() for face in made.faces) < 0.0:
         for face in made.faces:
