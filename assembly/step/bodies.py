@@ -27,7 +27,10 @@ EXACT = 1e-7
 
 @dataclass
 class Shape:
-    """Faces of one solid, or of one sheet, in the part's own coordinates."""
+    """Faces of one solid, or of one sheet, in the part's own coordinates.
+
+    `is_doubtful` says that OCCT has another part of the surface for one of them.
+    """
 
     faces: list[Face]
     color: Color | None
@@ -35,6 +38,7 @@ class Shape:
     missing: list[str]
     inexact: list[str]
     slits: list[str] = field(default_factory=list)
+    is_doubtful: bool = False
 
 
 class Unrepaired(AssemblyError):
@@ -48,6 +52,7 @@ class Source:
     `absent` has the names of missing files that it refers to. The document of a damaged file holds its undamaged
     entities. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
     numbers of faces that were read. Of a document without `repairs`, one face that cannot be read is enough to give up.
+    `is_repaired` says that OCCT has repaired faces all the same, which turns some inside out.
     """
 
     file: Path
@@ -58,11 +63,12 @@ class Source:
     names: tuple[str | None, ...] = ()
     advance: Callable[[int], object] = bool
     repairs: bool = True
+    is_repaired: bool = True
 
 
 def solids_of(path: str) -> Iterator[Any]:
     """OCCT's shapes of the bodies that `read_step` makes, in their order."""
-    document = document_of(path)[0]
+    document = document_of(path).made
     root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     for label in free_labels(root):
         for leaf in leaves(label, occt().TopLoc_Location(), None, None):
@@ -105,6 +111,7 @@ def read_shape(
         names.append(unique(own or f"face {k}", taken))
         tints.append(tint)
     read = read_faces(faces, edges, names, scale)
+    made.is_doubtful = edges.is_doubtful
     for face, label, tint, one in zip(faces, names, tints, read, strict=True):
         if isinstance(one, Unreadable):
             if _is_slit(face):
@@ -119,13 +126,16 @@ def read_shape(
     return made
 
 
-def _outward(shape: Any, made: Shape) -> Shape:
+def _outward(shape: Any, made: Shape, is_repaired: bool) -> Shape:
     """What was read of a shape, turned inside out where OCCT has turned it.
 
-    OCCT judges which side of a shell is outside by the faces as it reads them, and those with poles may be wrong.
+    OCCT judges which side of a shell is outside by the faces as it reads them, and those with poles may be wrong: where
+    it has another part of the surface, or has repaired it, or took the rest of a sphere before it was written.
     """
     o = occt()
-    if made.missing or shape.ShapeType() != o.TopAbs_SOLID or not any(face.surface._pole_bits for face in made.faces):
+    bits = {face.surface._pole_bits for face in made.faces}
+    doubtful = made.is_doubtful or bool(bits & {3, 12}) or is_repaired and bits != {0}
+    if not doubtful or made.missing or shape.ShapeType() != o.TopAbs_SOLID:
         return made
     if len(parts(shape, o.TopAbs_SHELL)) == 1 and sum(face.volume_integral() for face in made.faces) < 0.0:
         for face in made.faces:
@@ -184,7 +194,8 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                     original = Part(leaf.label)
                     images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
                     read[key] = [
-                        _outward(shape, read_shape(shape, told, original.color, scale)) for shape, told in images
+                        _outward(shape, read_shape(shape, told, original.color, scale), source.is_repaired)
+                        for shape, told in images
                     ]
                     # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
                     if not source.repairs and any(shape.missing or shape.slits for shape in read[key]):

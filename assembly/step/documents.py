@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from assembly._file_names import read_elsewhere
 from assembly.errors import InputError
@@ -52,8 +52,29 @@ def checked_unit(unit: str, name: str = "unit") -> float:
     return UNITS[unit]
 
 
-def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> tuple[Any, int, list[str]]:
-    """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
+class Document(NamedTuple):
+    """A file as a document of OCCT, in millimeters.
+
+    Attributes
+    ----------
+    made
+        TDocStd_Document.
+    faces : int
+        How many it has.
+    missing : list of str
+        Files that it needs and that are not there.
+    is_repaired : bool
+        Whether OCCT has repaired faces of it: those of other files always.
+    """
+
+    made: Any
+    faces: int
+    missing: list[str]
+    is_repaired: bool
+
+
+def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> Document:
+    """A file as a document of OCCT.
 
     OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
     repairs it does not: faces are checked when they are made of them.
@@ -73,7 +94,8 @@ def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -
     for other in others.files:
         _whole(str(other), other.read_bytes(), folder, other.relative_to(file.parent))
     del text
-    return (*_loaded(path, str(file) if folder is None else whole, folder is not None, repairs), others.missing)
+    made, count = _loaded(path, str(file) if folder is None else whole, folder is not None, repairs)
+    return Document(made, count, others.missing, repairs or bool(others.files))
 
 
 def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
@@ -92,7 +114,7 @@ def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.
 
 
 def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, int]:
-    """`document_of` a file that has the syntax of one: the file at the path, or its undamaged statements."""
+    """The document and number of faces of a file with the syntax of one: that at the path, or what is whole of it."""
     o = occt()
     # OCCT has its settings only after a reader was made.
     reader = o.STEPCAFControl_Reader()

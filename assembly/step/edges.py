@@ -56,7 +56,10 @@ class Laid(NamedTuple):
 
 
 class Edges:
-    """The edges of a solid, by their numbers from 1, and the two faces that meet at each."""
+    """The edges of a solid, by their numbers from 1, and the two faces that meet at each.
+
+    `is_doubtful` is set if OCCT has another part of the surface for a face that was laid.
+    """
 
     def __init__(self, shape: Any) -> None:
         o = occt()
@@ -70,6 +73,7 @@ class Edges:
         self._laid: dict[int, Laid | AssemblyError] = {}
         self._sides: dict[tuple[int, int], Side] = {}
         self._spaces: dict[int, Space | None] = {}
+        self.is_doubtful = False
 
     def known(self, edge: Any) -> Known:
         """What is known of an edge."""
@@ -101,6 +105,7 @@ class Edges:
         """Find what faces of the solid, which are taken forward, lie in, all of them before `laid` is asked for one."""
         left = {self._face_map.FindIndex(face): face for face in faces}
         drawn = {number: _kept(_outlined, face) for number, face in left.items() if number}
+        self.is_doubtful = any(isinstance(outline, _Outline) and outline.is_other for outline in drawn.values())
         for number, outline in drawn.items():
             self._laid[number] = outline if isinstance(outline, AssemblyError) else _kept(_laid, outline)
 
@@ -168,11 +173,12 @@ class Edges:
 
 
 class _Outline(NamedTuple):
-    """A surface, the wires of a face on it, and their extent."""
+    """A surface, the wires of a face on it, their extent, and whether OCCT has another part of the surface."""
 
     surface: Any
     wires: list[Wire]
     box: Box
+    is_other: bool
 
 
 def _outlined(face: Any) -> _Outline:
@@ -182,10 +188,10 @@ def _outlined(face: Any) -> _Outline:
         raise Unreadable("it has no surface")
     wires = wires_of(face, surface)
     drawn = polar(wires, surface, face)
-    wires, box = drawn or (wires, bounds(wires, surface, face))
+    wires, box, is_other = drawn or (wires, bounds(wires, surface, face), False)
     if not all(isfinite(x) and abs(x) < _FAR for x in box):
         raise Unreadable("it has no boundary, and its surface is unbounded")
-    return _Outline(surface, wires, box)
+    return _Outline(surface, wires, box, is_other)
 
 
 def _laid(outline: _Outline) -> Laid:

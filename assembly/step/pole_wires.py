@@ -30,15 +30,21 @@ TURN = 2.0 * pi
 _SAMPLES = 17
 # Edges that meet at a pole within this angle may be tangent: what they do beside the pole counts.
 _TANGENT = 1e-3
+# Areas in (u, v) that differ by less, over that of a turn, are one.
+_SAME = 1e-6
 # OCCT stands for "without end" with numbers beyond this one.
 _FAR = 1e50
 
 
 class Polar(NamedTuple):
-    """Wires of a face without seams, those that bound it from outside first, and the extent of the face."""
+    """Wires of a face without seams, those that bound it from outside first, and the extent of the face.
+
+    `is_other` says whether that is not the part of the surface that OCCT has.
+    """
 
     wires: list[Wire]
     box: Box
+    is_other: bool
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,8 @@ def polar(wires: Sequence[Wire], surface: Any, face: Any) -> Polar | None:
     `face` is taken forward.
     """
     o = occt()
+    while isinstance(surface, o.Geom_RectangularTrimmedSurface):
+        surface = surface.BasisSurface()
     if not isinstance(surface, (o.Geom_SphericalSurface, o.Geom_ConicalSurface, o.Geom_SurfaceOfRevolution)):
         return None
     every = [traced for wire in wires for traced in wire.edges]
@@ -85,10 +93,33 @@ def polar(wires: Sequence[Wire], surface: Any, face: Any) -> Polar | None:
         _follow(row)
     if not _link(runs):
         return None
+    _meet_off_poles(runs, surface)
     loops = [_drawn(cycle, face, degenerated) for cycle in _cycles(runs)]
     if len(wires) == len(loops) == 1 and not degenerated and loops[0].turn == 0.0 and loops[0].area > 0.0:
         return None
-    return _extended(loops, surface, poles)
+    made = _extended(loops, surface, poles)
+    return made._replace(is_other=_is_other(degenerated, loops, made))
+
+
+def _is_other(degenerated: Sequence[Traced], loops: Sequence[_Loop], made: Polar) -> bool:
+    """Whether a face is not the part of the surface that OCCT's wires go round.
+
+    Areas in (u, v) are compared, the integrals of -v du: along edges these are the same, along seams zero.
+    """
+    given = [_swept(traced) for traced in degenerated]
+    drawn = [_swept(traced) for loop in loops for traced in loop.wire.edges if _is_pole(traced)]
+    low, high = made.box[2:]
+    above = sum(loop.turn for loop in loops)
+    beyond = above * (high if above > 0.0 else low)
+    if not any(loop.turn != 0.0 or loop.area > 0.0 for loop in loops):
+        beyond = TURN * (high - low)
+    return bool(abs(sum(drawn) + beyond - sum(given)) > _SAME * TURN * max(abs(low), abs(high)))
+
+
+def _swept(traced: Traced) -> float:
+    """The integral of -v du along a line along a pole."""
+    (u, v), (x, _) = (traced.curve.Value(t).Coord() for t in (traced.low, traced.high))
+    return float(v * (x - u) if traced.edge.Orientation() == occt().TopAbs_REVERSED else v * (u - x))
 
 
 def _poles(surface: Any, every: Sequence[Traced]) -> list[_Pole]:
@@ -165,6 +196,24 @@ def _link(runs: list[_Run]) -> bool:
         run.after = starts[int(np.argmin(ways))]
         taken.add(id(run.after))
     return True
+
+
+def _meet_off_poles(runs: Sequence[_Run], surface: Any) -> None:
+    """Take no vertex for a pole at which two edges come to one place of the surface that is off the pole.
+
+    OCCT draws a line along a pole there for many an edge that goes round the pole and crosses the seam, and gives the
+    vertex a tolerance that reaches the pole.
+    """
+    for run in runs:
+        after, pole = run.after, run.poles[1]
+        if after is None or pole is None:
+            continue
+        here, there = (np.array(surface.Value(*place).Coord()) for place in (run.places[-1], after.places[0]))
+        off = float(np.linalg.norm(here - pole.point))
+        turn = after.places[0, 0] - run.places[-1, 0]
+        turn -= TURN * round(turn / TURN)
+        if off > CONFUSION and abs(turn) < _TANGENT and np.linalg.norm(there - here) < _TANGENT * off:
+            run.poles, after.poles = (run.poles[0], None), (None, after.poles[1])
 
 
 def _way(run: _Run, after: _Run, pole: _Pole | None) -> float:
@@ -288,7 +337,7 @@ def _extended(loops: list[_Loop], surface: Any, poles: Sequence[_Pole]) -> Polar
         )
     for k, loop in enumerate(ordered):
         loop.wire.is_outer = k < len(ordered) - len(holes) and k == 0
-    return Polar([loop.wire for loop in ordered], box)
+    return Polar([loop.wire for loop in ordered], box, False)
 
 
 def _ends(surface: Any, poles: Sequence[_Pole]) -> Pair:

@@ -183,10 +183,10 @@ def bodies_of(
     damaged = folder is not None
 
     def read(repairs: bool) -> tuple[list[Body], list[str]]:
-        document, count, absent = document_of(path, folder, repairs=repairs)
+        document, count, absent, is_repaired = document_of(path, folder, repairs=repairs)
         loaded()
         with watched(progress, "reading", count, "face") as advance:
-            found = Source(Path(path), document, count, tuple(absent), damaged, (), advance, repairs)
+            found = Source(Path(path), document, count, tuple(absent), damaged, (), advance, repairs, is_repaired)
             return bodies_in(found, 1.0 / checked_unit(unit), strict)
 
     with quiet(), uncollected():

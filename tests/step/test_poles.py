@@ -13,6 +13,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.step.carriers import reals_of
+from assembly.step.edges import Edges
 from assembly.step.occt import parts, quiet
 from tests.step.models import O, point
 
@@ -107,12 +108,6 @@ def same(found, wanted):
     )
 
 
-def has_dome(shape):
-    """Whether a shape has a surface of revolution, which has no other axis: OCCT misreads some that have a pole."""
-    surfaces = (O.BRep_Tool.Surface_s(O.as_face(face)) for face in parts(shape, O.TopAbs_FACE))
-    return any(isinstance(surface, O.Geom_SurfaceOfRevolution) for surface in surfaces)
-
-
 def is_sound(shape):
     """Whether OCCT has made something that it finds valid."""
     return bool(parts(shape, O.TopAbs_SOLID)) and O.BRepCheck_Analyzer(shape).IsValid()
@@ -201,12 +196,26 @@ def test_both_ways(name, tmp_path):
     assert same(measured(read_by_occt(tmp_path / "ours.step")), wanted)
 
 
-# Seeds of shapes of which OCCT read the complement of a face in what was written of them about its own axis.
-@pytest.mark.parametrize("seed", [24, 54, 73, 113, 128, 155, 228, 264])
+# Seeds of shapes of which OCCT read the complement of a face in what was written of them about its own axis; and of
+# domes whose faces lost their seam, or were not valid, where a wire did not begin beside the pole.
+@pytest.mark.parametrize("seed", [24, 54, 73, 113, 128, 155, 228, 264, 13, 87, 118, 170, 174])
 def test_occt_reads_what_is_written(seed, tmp_path):
     shape = by_random(seed)
     asm.write_step(tmp_path / "ours.step", asm.read_step(written(shape, tmp_path / "given.step")))
-    assert same(measured(read_by_occt(tmp_path / "ours.step")), measured(shape))
+    found = read_by_occt(tmp_path / "ours.step")
+    assert is_sound(found)
+    assert same(measured(found), measured(shape))
+
+
+# OCCT draws a line along the pole, for these, where an edge that goes round it crosses the seam; the last is a sphere
+# that is trimmed, and touches its own seam.
+@pytest.mark.parametrize("seed", [13, 63, 68, 132, 170, 174, 204, 237, 18])
+def test_an_edge_that_crosses_the_seam_beside_a_pole(seed, tmp_path):
+    shape = by_random(seed)
+    bodies = asm.read_step(written(shape, tmp_path / "given.step"))
+    assert agrees(bodies, measured(shape))
+    asm.write_step(tmp_path / "ours.step", bodies)
+    assert agrees(asm.read_step(tmp_path / "ours.step"), measured(shape))
 
 
 def test_an_edge_that_ends_a_millionth_from_a_pole_is_projected(tmp_path):
@@ -227,6 +236,15 @@ def test_domes_whose_boundary_crosses_the_seam_at_the_pole(seed, tmp_path):
     assert agrees(asm.read_step(tmp_path / "ours.step"), measured(shape))
 
 
+def test_which_side_is_outside_is_asked_where_occt_has_another_face(tmp_path):
+    """An integral over all faces of a body takes a fifth of a read; OCCT has the cone of a drill as it is."""
+    for shape, is_doubtful in ((cone_of(4.0, 5.0, (0, 0, 0), (1, 0, 0), (0, 0, 1)), False), (by_random(13), True)):
+        (solid,) = parts(read_by_occt(written(shape, tmp_path / "given.step")), O.TopAbs_SOLID)
+        edges = Edges(solid)
+        edges.lay([O.as_face(face.Oriented(O.TopAbs_FORWARD)) for face in parts(solid, O.TopAbs_FACE)])
+        assert edges.is_doubtful == is_doubtful
+
+
 def test_random_shapes(tmp_path, cases):
     # None is wrong; some are refused, which is told.
     read = refused = 0
@@ -240,10 +258,10 @@ def test_random_shapes(tmp_path, cases):
             asm.write_step(tmp_path / "ours.step", bodies)
             again = asm.read_step(tmp_path / "ours.step")
             right = agrees(bodies, wanted) and agrees(again, wanted)
-            right = right and (has_dome(shape) or same(measured(read_by_occt(tmp_path / "ours.step")), wanted))
+            right = right and same(measured(read_by_occt(tmp_path / "ours.step")), wanted)
         except InputError:
             refused += 1
             continue
         assert right, seed
         read += 1
-    assert refused <= 0.15 * read
+    assert refused <= 0.01 * read

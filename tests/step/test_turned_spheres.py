@@ -8,8 +8,10 @@ import pytest
 import assembly as asm
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Sphere
+from assembly.step.occt import parts
 from assembly.step.turned_spheres import Region, region_of
-from tests.step.test_poles import CASES, by_random, written
+from tests.step.models import O
+from tests.step.test_poles import CASES, by_random, read_by_occt, written
 
 
 def balls(shape, tmp_path):
@@ -104,3 +106,17 @@ def test_circles_about_the_axis_keep_it():
     ]
     face = asm.Face(ball, rings[0], [rings[1]])
     assert region_of(face).surface is face.surface
+
+
+@pytest.mark.parametrize("name", ["a corner at the pole", "three quarters are left"])
+def test_free_edges_that_are_circles_are_written_as_such(name, tmp_path):
+    faces = balls(CASES[name](), tmp_path)
+    asm.write_step(tmp_path / "ours.step", asm.Body("ball", faces))
+    (face,) = map(O.as_face, parts(read_by_occt(tmp_path / "ours.step"), O.TopAbs_FACE))
+    edges = [O.as_edge(edge) for edge in parts(face, O.TopAbs_EDGE)]
+    # OCCT adds the seams, which we leave out.
+    added = [O.BRep_Tool.Degenerated_s(edge) or O.BRep_Tool.IsClosed_s(edge, face) for edge in edges]
+    curves = [O.BRep_Tool.Curve_s(edge, 0.0, 0.0) for edge, is_added in zip(edges, added, strict=True) if not is_added]
+    assert len(curves) > 1 and all(isinstance(curve, O.Geom_Circle) for curve in curves)
+    again = asm.read_step(tmp_path / "ours.step")
+    assert abs(sum(body.area for body in again) / sum(face.area() for face in faces) - 1.0) < 1e-9

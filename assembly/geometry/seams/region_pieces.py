@@ -11,7 +11,7 @@ from assembly.errors import AssemblyError
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["EDGE", "POLE", "SEAM", "Piece", "Uncut", "closed_at_poles", "segment", "shifted"]
+__all__ = ["EDGE", "POLE", "SEAM", "Piece", "Uncut", "begun_at_pole", "closed_at_poles", "segment", "shifted"]
 
 Array = NDArray[np.float64]
 EDGE, SEAM, POLE = "edge", "seam", "pole"
@@ -105,3 +105,17 @@ def closed_at_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> li
             row += other
         done.append(row)
     return done
+
+
+def begun_at_pole(chain: list[Piece], surface: NurbsSurface) -> list[Piece]:
+    """A closed chain that begins where it is nearest to a pole, after what runs along that."""
+    far = np.full(len(chain), np.inf)
+    for side in range(4):
+        axis, end = divmod(side, 2)
+        if surface._pole_bits & (1 << side):
+            starts = np.array([piece.ends[0, axis] for piece in chain])
+            far = np.minimum(far, np.abs(starts - surface.domain[axis][end]))
+    # What runs along a pole is as near to it at its start.
+    far[[piece.kind == POLE for piece in chain]] = np.inf
+    first = int(np.argmin(far))
+    return chain[first:] + chain[:first]
