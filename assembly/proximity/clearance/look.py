@@ -235,7 +235,9 @@ def seek(forest, front, way, limits, tail):
             counts.opened += 1
             keep(front, Parted(nodes.a, nodes.b, LEFT_OPEN), n, -math.inf)
             continue
-        if not divide(forest, front, nodes, way.after, n, tail, max(way.sag - gaps[1], 0.0)):
+        # They are as far from being parted all the way as at the end where they are farther from it.
+        short = max(way.sag - min(gaps[0], gaps[1]), 0.0)
+        if not divide(forest, front, nodes, way.after, n, tail, short):
             return NO_ROOM
         tail += 2
     return OPEN if counts.opened > 0 else CLEAR
