@@ -70,5 +70,5 @@ def test_cells_beside_a_rim_become_shorter_where_a_way_turns(sought):
     angle = 0.02 * np.arange(192)
     path = np.column_stack([0.1 * np.sin(angle) - 0.2, 0.1 * np.cos(angle), np.full(192, 0.2)])
     most, held = most_of_a_tick(scene.tracker(box.point(0, 0, 0)), path, sought)
-    # Halved by chord error they took 62,000.
-    assert held <= 1 and most <= 2 * BUDGET
+    # Halved by chord error they took 62,000, and by planes that stay, while the box's face turns, 6,000.
+    assert held <= 1 and most <= 0.5 * BUDGET

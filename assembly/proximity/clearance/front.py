@@ -19,11 +19,13 @@ from collections import namedtuple
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly.geometry.vec import matvec
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_PLANE_OF_B,
     BY_SLEEVE,
     BY_SPINES,
     LEFT_OPEN,
@@ -320,14 +322,23 @@ def test_again(forest, front, way, needed, i):
     if nodes.how == BY_SPINES:
         return ask_spines_again(forest, front, way, needed, i)
     gap = gap_of(forest, nodes, way.after, n) - needed
-    # expiry - travelled is a lower bound of the gap at the last pose.
-    fine = stays_apart(forest, nodes, way, n, (parted.expiry - travelled, gap))
+    # expiry - travelled is a lower bound of the gap at the last pose; where the direction turns, of the distance alone.
+    known = -math.inf if nodes.how == BY_PLANE_OF_B else parted.expiry - travelled
+    fine = stays_apart(forest, nodes, way, n, (known, gap))
     if gap > 0.0 and not fine:
         before = gap_of(forest, nodes, way.before, n) - needed
         fine = stays_apart(forest, nodes, way, n, (before, gap))
     if fine:
         keep(front, nodes, n, expiry_of(nodes, travelled + way.moved, gap))
     return fine
+
+
+@kernel(inline=True)
+def hint_of(nodes, way, n):
+    """The direction that is tried first of two nodes, seen from a; zero for none."""
+    if nodes.how == BY_PLANE_OF_B:
+        return matvec(way.after.rotation, n)
+    return (0.0, 0.0, 0.0) if nodes.how == BY_SPINES else n
 
 
 @kernel(inner=True)
@@ -370,6 +381,6 @@ def ask_again(forest, front, way, limits):
             counts.next_count = i
         if not test_again(forest, front, way, needed, i):
             complete_next(front, i, travelled)
-            put_waiting(front, tail, nodes, (0.0, 0.0, 0.0) if nodes.how == BY_SPINES else n)
+            put_waiting(front, tail, nodes, hint_of(nodes, way, n))
             tail += 1
     return tail, over

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import sub
+from assembly.geometry.vec import matvec_t, neg, sub
 from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import (
@@ -30,6 +30,7 @@ from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_PLANE_OF_B,
     BY_SPINES,
     CLEAR,
     CROSSING,
@@ -47,7 +48,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, most_in_bore, placed
+from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, most_in_bore, normal_of, placed
 from assembly.proximity.clearance.sleeves import best_bore, gap_of
 from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
@@ -77,6 +78,27 @@ def part_wires(forest, front, way, nodes, needed):
 
 
 @kernel(inner=True)
+def part_by_carried(forest, front, way, nodes, n, needed):
+    """Whether a plane that moves along with b parts two nodes all the way: along n at the end, or a normal of b.
+
+    Where b turns, a plane that stays between the two is as wide as b's face, which turns, lets it be; and the face is
+    halved until its parts are so narrow. One that turns with the face has room for all of it.
+    """
+    by_plane, normals = Parted(nodes.a, nodes.b, BY_PLANE_OF_B), is_cell(forest, nodes.b)
+    for i in range(3 if normals else 1):
+        m = matvec_t(way.after.rotation, n) if i == 0 else normal_of(forest, nodes.b)
+        m = neg(m) if i == 2 else m
+        after = gap_of(forest, by_plane, way.after, m) - needed
+        if not after > 0.0:
+            continue
+        before = gap_of(forest, by_plane, way.before, m) - needed
+        if stays_apart(forest, by_plane, way, m, (before, after)):
+            keep(front, by_plane, m, pair_proof_at(front.pair, 0).travelled + way.moved + after)
+            return True
+    return False
+
+
+@kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
     """Seek a proof that two nodes are apart: what was found, the direction, both gaps, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
@@ -85,7 +107,10 @@ def part_nodes(forest, front, way, nodes, hint, needed):
     if stays_apart(forest, nodes, way, n, gaps):
         keep(front, nodes, n, travelled + gaps[1])
         return ARE_PARTED, n, gaps, overlap
-    if is_wire(forest, nodes.a) and is_wire(forest, nodes.b) and part_wires(forest, front, way, nodes, needed):
+    if is_wire(forest, nodes.a) and is_wire(forest, nodes.b):
+        if part_wires(forest, front, way, nodes, needed):
+            return ARE_PARTED, n, gaps, overlap
+    elif way.swept and way.factor > 0.0 and part_by_carried(forest, front, way, nodes, n, needed):
         return ARE_PARTED, n, gaps, overlap
     how, room = best_bore(forest, nodes.a, nodes.b, way.after)
     if how != BY_PLANE and room > needed:

@@ -136,14 +136,15 @@ NODES = record_dtype(
     "i8",
     a=1,
     b=1,
-    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE: what parts them; OPEN_YET, LEFT_OPEN
+    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_PLANE_OF_B, BY_SLEEVE: what parts them; OPEN_YET, LEFT_OPEN
 )
 nodes_at = record_view(NODES)
 NODES_SIZE = size_of(NODES)
 # A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines. Of
-# a look whose time was over: nothing yet. The bore of a in which the part of b beside a is, in three ways
-# (`sleeves.py`). Of a look that may go on: nothing, and no more is tried.
-BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, OPEN_YET, BY_SLEEVE = 0, 1, 2, 3, 4, 5
+# a look whose time was over: nothing yet. A plane between them that moves along with b; its direction is in axes of b.
+# The bore of a in which the part of b beside a is, in three ways (`sleeves.py`). Of a look that may go on: nothing, and
+# no more is tried.
+BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, OPEN_YET, BY_PLANE_OF_B, BY_SLEEVE = 0, 1, 2, 3, 4, 5, 6
 LEFT_OPEN = -1
 # How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown;
 # SPENT: the time is over, and the next call goes on.
