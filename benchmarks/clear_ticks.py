@@ -28,8 +28,8 @@ tick. Looks run one after the other in a kernel, each with its time; the least o
 median and the longest. Bodies go 1e-3 of their size a look. A pin of 0.499 in a bore of 0.5, of a plate with two bores,
 turns, slides and drifts; "covered" is the same pin at rest, where the motion bound tells all. In contact the pin slides
 and turns along the wall, and a box lies flat on the plate over a bore's rim, both moved off by 1e-8. Linked tori have
-radii of 0.6 and 0.15. The clips are those of "Tracking", three that touch, behind their hand; a clip has two neighbors. A
-first look is that of a proof that has looked at nothing, a call from Python. Right is a look that proves its way and
+radii of 0.6 and 0.15. The clips are those of "Tracking", three that touch, behind their hand; a clip has two neighbors.
+A first look is that of a proof that has looked at nothing, a call from Python. Right is a look that proves its way and
 whose bound is no larger than the gap, which is known of the pin, the box and the tori. A box that is drawn down beside
 a bore tips over its rim: whole ticks from Python."""
 

@@ -6,10 +6,10 @@ direction is sought; if none is found, one of the nodes is replaced by its child
 
 A look writes the next front beside the present one, of which most pairs need no test and stay as they are: as long as
 no direction fails, only those that are tested are written, each beside its own row. If the look ends clear, the next
-front replaces the present one; else nothing changes. If the time limit interrupts a look, the next front also replaces
-the present one: its pairs then describe the pose that is looked at, and the next look at that pose goes on with the
-pairs that are not separated yet. If that look does not end clear, or another pose is looked at instead, the front from
-before is restored, since the front of a failed proof has many small pieces.
+front replaces the present one; else nothing changes. If the time limit or full memory interrupts a look, the next front
+also replaces the present one: its pairs then describe the pose that is looked at, and the next look at that pose goes
+on with the pairs that are not separated yet. If that look does not end clear, or another pose is looked at instead, the
+front from before is restored, since the front of a failed proof has many small pieces.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ def copy_rows(front, begin, to, count):
 
 @kernel(inner=True)
 def put_off(front, pose, swept, head, tail):
-    """Interrupt a look at its deadline: pairs of the queue go to the front, to be tested next time.
+    """Interrupt a look at its deadline, or where memory is full: pairs of the queue go to the front for the next time.
 
     The front of the last pose is saved in the second half of the rows.
     """
@@ -220,7 +220,7 @@ def put_off(front, pose, swept, head, tail):
         keep(front, Parted(row.a, row.b, OPEN_YET), vector(parted_at(front.waiting, at).normal), -math.inf)
     take_next(front)
     counts.earlier += head
-    pair.soonest = -math.inf
+    pair.soonest, pair.behind = -math.inf, 0.0
     pair.underway = ON_ITS_WAY if swept else TO_POSE
     for k in range(9):
         pair.aim_turn[k] = pose.rotation[k]

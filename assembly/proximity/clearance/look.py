@@ -230,6 +230,7 @@ def seek(forest, front, way, limits, tail):
     head, earlier = 0, counts.earlier
     while head < tail:
         if counts.next_count + tail - head + 2 >= room:
+            put_off(front, way.after, way.swept, head, tail)
             return NO_ROOM
         if head % SOUGHT_AT_ONCE == SOUGHT_AT_ONCE - 1 and is_over(limits):
             put_off(front, way.after, way.swept, head, tail)
@@ -263,6 +264,7 @@ def seek(forest, front, way, limits, tail):
         # They are as far from being parted all the way as at the end where they are farther from it.
         short = max(way.sag - min(gaps[0], gaps[1]), 0.0)
         if not divide(forest, front, nodes, way.after, n, tail, short):
+            put_off(front, way.after, way.swept, head - 1, tail)
             return NO_ROOM
         tail += 2
     return OPEN if counts.opened > 0 else CLEAR
@@ -299,7 +301,7 @@ def look(forest, front, pose, limits, swept):
     if code == CLEAR:
         replace_front(front, pose, travelled)
         pair.underway = 0.0
-    elif code != SPENT:
+    elif code != SPENT and code != NO_ROOM:
         leave_off(front)
     return code
 
@@ -309,8 +311,8 @@ def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
     `part` of the pair's record is the part of the way that is proven clear. If it is not the whole way, the last pose
-    stays as it was; but if the time is over, it becomes the pose up to which the way is clear, and the next call goes
-    on from there. SHORTEST is a part of the whole way, not of the way that is left: that always has a half.
+    stays as it was; but if the time is over, or memory full, it becomes the pose up to which the way is clear, and the
+    next call goes on from there. SHORTEST is a part of the whole way, not of what is left: that always has a half.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
@@ -341,13 +343,13 @@ def go_to(forest, front, pose, limits):
                 # As far as what has just failed.
                 step *= 0.5
     pair.part = 1.0 if done == 1.0 else behind + (1.0 - behind) * done
-    if code == SPENT:
+    if code == SPENT or code == NO_ROOM:
         pair.aim_part = 1.0 if to == 1.0 else (to - done) / (1.0 - done)
         pair.behind = pair.part
         for k in range(9):
             pair.origin_turn[k] = origin.rotation[k]
         put(pair.origin_shift, origin.shift)
-        return SPENT
+        return code
     if code != CLEAR and pair.part > 0.0:
         pair.travelled += way_of(last_pose(front), origin, center, root.radius, False).moved
         remember(front, origin)
