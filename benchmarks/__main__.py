@@ -40,6 +40,7 @@ BENCHMARKS = (
     "features",
     "facets",
     "manifolds",
+    "clear_ticks",
     "wires",
     "contact_errors",
     "tracking",

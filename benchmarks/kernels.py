@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
 from assembly._record import Store
@@ -18,6 +19,7 @@ from assembly.geometry.vec import add
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.bvh.tree import pairs_within
+from assembly.proximity.clearance.pair_looks import ON_WAY
 from assembly.proximity.extrema.face_face import pair_frame, solve_pair
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feature_query import feature_derivatives
@@ -158,3 +160,16 @@ def round_manifolds_along(hollow, full, turns, shifts, rows):
         count, bound = round_rows(hollow, full, turns[i], shifts[i], rows)
         total += count + bound
     return total
+
+
+@kernel
+def looks_along(addresses, lent, poses, moves, touching, codes, seconds):
+    """Looks at pairs of bodies on the way to poses (k, n, 7), one after the other, as ticks have them.
+
+    addresses: of `stay_clear` and of a clock. Writes how each look ended and how long it took [ns].
+    """
+    proof, clock = addresses
+    for k in range(len(poses)):
+        begin = call_address(clock, ())
+        codes[k] = call_address(proof, (lent, poses[k], moves, touching, (ON_WAY, 0), (0, 0)))
+        seconds[k] = call_address(clock, ()) - begin

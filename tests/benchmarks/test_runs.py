@@ -33,6 +33,7 @@ def slope(what):
         "facets",
         "distances",
         "manifolds",
+        "clear_ticks",
         "wires",
         "tracking",
         "mechanisms",

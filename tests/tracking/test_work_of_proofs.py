@@ -56,3 +56,19 @@ def test_a_way_along_a_bore_makes_no_cells(sought):
     most, held = most_of_a_tick(scene.tracker(bodies[1].point(0, 0, 20)), path, sought)
     # Cells as fine as the gap took 19,000.
     assert held == 0 and most <= 0.5 * BUDGET
+
+
+def test_cells_beside_a_rim_become_shorter_where_a_way_turns(sought):
+    """A box tips over a hole's rim: its face parts from flat cells beside the rim at the end, and not at the begin.
+
+    By chord error, which is next to nothing there, they were halved along the rim again and again.
+    """
+    plate = asm.Body("plate", asm.shapes.plate(3, 2, 0.3, [(-0.7, 0, 0.5), (0.7, 0.1, 0.4)]), fixed=True)
+    box = asm.Body("box", asm.shapes.box(0.4, 0.3, 0.2), (-0.2, 0.0, 0.3))
+    scene = asm.Assembly([plate, box])
+    scene.constrain(asm.Clearance())
+    angle = 0.02 * np.arange(192)
+    path = np.column_stack([0.1 * np.sin(angle) - 0.2, 0.1 * np.cos(angle), np.full(192, 0.2)])
+    most, held = most_of_a_tick(scene.tracker(box.point(0, 0, 0)), path, sought)
+    # Halved by chord error they took 62,000, and by planes that stay, while the box's face turns, 6,000.
+    assert held <= 1 and most <= 0.5 * BUDGET

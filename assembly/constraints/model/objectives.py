@@ -136,6 +136,8 @@ class FrameDistance(Objective):
         self._frame = frame
         self._length = 0.5 * frame.body.size or 1.0 if length is None else extent("length", length)
         self._axes = frame.axes
+        # Axes of a frame, and the turn from these to the body's.
+        self._back: tuple[Array | None, Array] = None, np.empty(0)
         self.target = target
 
     @property
@@ -173,8 +175,11 @@ class FrameDistance(Objective):
 
     def body_quaternion_of(self, target: Pose) -> Array:
         """The quaternion of the body whose frame is at a target: after the turn from the frame's axes to the body's."""
-        w, x, y, z = axes_quaternion(self._frame.axes)
-        return multiply(target.quaternion, np.array([w, -x, -y, -z]))
+        axes = self._frame.axes
+        if self._back[0] is not axes:
+            w, x, y, z = axes_quaternion(axes).tolist()
+            self._back = axes, np.array([w, -x, -y, -z])
+        return multiply(target.quaternion, self._back[1])
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"

@@ -6,10 +6,10 @@ direction is sought; if none is found, one of the nodes is replaced by its child
 
 A look writes the next front beside the present one, of which most pairs need no test and stay as they are: as long as
 no direction fails, only those that are tested are written, each beside its own row. If the look ends clear, the next
-front replaces the present one; else nothing changes. If the time limit interrupts a look, the next front also replaces
-the present one: its pairs then describe the pose that is looked at, and the next look at that pose goes on with the
-pairs that are not separated yet. If that look does not end clear, or another pose is looked at instead, the front from
-before is restored, since the front of a failed proof has many small pieces.
+front replaces the present one; else nothing changes. If the time limit or full memory interrupts a look, the next front
+also replaces the present one: its pairs then describe the pose that is looked at, and the next look at that pose goes
+on with the pairs that are not separated yet. If that look does not end clear, or another pose is looked at instead, the
+front from before is restored, since the front of a failed proof has many small pieces.
 """
 
 from __future__ import annotations
@@ -19,11 +19,13 @@ from collections import namedtuple
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly.geometry.vec import matvec
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_PLANE_OF_B,
     BY_SLEEVE,
     BY_SPINES,
     LEFT_OPEN,
@@ -204,7 +206,7 @@ def copy_rows(front, begin, to, count):
 
 @kernel(inner=True)
 def put_off(front, pose, swept, head, tail):
-    """Interrupt a look at its deadline: pairs of the queue go to the front, to be tested next time.
+    """Interrupt a look at its deadline, or where memory is full: pairs of the queue go to the front for the next time.
 
     The front of the last pose is saved in the second half of the rows.
     """
@@ -218,7 +220,7 @@ def put_off(front, pose, swept, head, tail):
         keep(front, Parted(row.a, row.b, OPEN_YET), vector(parted_at(front.waiting, at).normal), -math.inf)
     take_next(front)
     counts.earlier += head
-    pair.soonest = -math.inf
+    pair.soonest, pair.behind = -math.inf, 0.0
     pair.underway = ON_ITS_WAY if swept else TO_POSE
     for k in range(9):
         pair.aim_turn[k] = pose.rotation[k]
@@ -320,14 +322,23 @@ def test_again(forest, front, way, needed, i):
     if nodes.how == BY_SPINES:
         return ask_spines_again(forest, front, way, needed, i)
     gap = gap_of(forest, nodes, way.after, n) - needed
-    # expiry - travelled is a lower bound of the gap at the last pose.
-    fine = stays_apart(forest, nodes, way, n, (parted.expiry - travelled, gap))
+    # expiry - travelled is a lower bound of the gap at the last pose; where the direction turns, of the distance alone.
+    known = -math.inf if nodes.how == BY_PLANE_OF_B else parted.expiry - travelled
+    fine = stays_apart(forest, nodes, way, n, (known, gap))
     if gap > 0.0 and not fine:
         before = gap_of(forest, nodes, way.before, n) - needed
         fine = stays_apart(forest, nodes, way, n, (before, gap))
     if fine:
         keep(front, nodes, n, expiry_of(nodes, travelled + way.moved, gap))
     return fine
+
+
+@kernel(inline=True)
+def hint_of(nodes, way, n):
+    """The direction that is tried first of two nodes, seen from a; zero for none."""
+    if nodes.how == BY_PLANE_OF_B:
+        return matvec(way.after.rotation, n)
+    return (0.0, 0.0, 0.0) if nodes.how == BY_SPINES else n
 
 
 @kernel(inner=True)
@@ -370,6 +381,6 @@ def ask_again(forest, front, way, limits):
             counts.next_count = i
         if not test_again(forest, front, way, needed, i):
             complete_next(front, i, travelled)
-            put_waiting(front, tail, nodes, (0.0, 0.0, 0.0) if nodes.how == BY_SPINES else n)
+            put_waiting(front, tail, nodes, hint_of(nodes, way, n))
             tail += 1
     return tail, over

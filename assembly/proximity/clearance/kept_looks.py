@@ -160,6 +160,8 @@ class KeptLooks(BodyPairs):
                 self._codes[self._codes == NO_ROOM] = SPENT
                 task = GOING_ON
             code = stay_clear(self.lent, at, moves, touching, (task, budget or 0), until)
+        if code == NO_ROOM:
+            self._give_up()
         if code == CLEAR:
             self._at = at.tobytes()
         return int(code)
@@ -187,12 +189,13 @@ class KeptLooks(BodyPairs):
             asked = waiting != PASSED_BY
             short, late = asked & (self._codes == NO_ROOM), asked & (self._codes == SPENT)
             if short.any() and not self._grow():
+                self._give_up()
                 self._codes[short] = OPEN
                 short[:] = False
             # What is in the front already stays there; where the time was over there may be none yet.
-            begun = short | (late & (pair.underway > 0.0))
+            begun = (short | late) & (pair.underway > 0.0)
             kept = np.where(begun & (waiting == BEGUN_ANEW), AT_POSE, waiting)
-            kept = np.where(late & begun & (waiting == ON_WAY_ANEW), ON_WAY, kept)
+            kept = np.where(begun & (waiting == ON_WAY_ANEW), ON_WAY, kept)
             waiting = np.where(short | late, kept, PASSED_BY)
             if late.any():
                 yield
@@ -211,6 +214,19 @@ class KeptLooks(BodyPairs):
         for k in np.flatnonzero(pair.underway).tolist():
             self.fronts.take_back(k)
         for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
-            now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
-            pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
-            pair.turn[k], pair.shift[k] = turn, shift
+            self._begin_at(k, turn, shift)
+
+    def _begin_at(self, k: int, turn: Array, shift: Array) -> None:
+        """Make an earlier pose of pair k, from which all of the way was clear, the last one again."""
+        pair = self.fronts.pair
+        now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
+        pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
+        pair.turn[k], pair.shift[k] = turn, shift
+
+    def _give_up(self) -> None:
+        """Give up looks that go on, where there may be no more room: last poses are those at which they began."""
+        pair = self.fronts.pair
+        for k in np.flatnonzero((self._codes == NO_ROOM) & (pair.underway > 0.0)).tolist():
+            self.fronts.take_back(k)
+            if pair.behind[k] > 0.0:
+                self._begin_at(k, pair.origin_turn[k].copy(), pair.origin_shift[k].copy())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import sub
+from assembly.geometry.vec import matvec_t, neg, sub
 from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import (
@@ -30,6 +30,7 @@ from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_PLANE_OF_B,
     BY_SPINES,
     CLEAR,
     CROSSING,
@@ -47,7 +48,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, most_in_bore, placed
+from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, most_in_bore, normal_of, placed
 from assembly.proximity.clearance.sleeves import best_bore, gap_of
 from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
@@ -77,6 +78,27 @@ def part_wires(forest, front, way, nodes, needed):
 
 
 @kernel(inner=True)
+def part_by_carried(forest, front, way, nodes, n, needed):
+    """Whether a plane that moves along with b parts two nodes all the way: along n at the end, or a normal of b.
+
+    Where b turns, a plane that stays between the two is as wide as b's face, which turns, lets it be; and the face is
+    halved until its parts are so narrow. One that turns with the face has room for all of it.
+    """
+    by_plane, normals = Parted(nodes.a, nodes.b, BY_PLANE_OF_B), is_cell(forest, nodes.b)
+    for i in range(3 if normals else 1):
+        m = matvec_t(way.after.rotation, n) if i == 0 else normal_of(forest, nodes.b)
+        m = neg(m) if i == 2 else m
+        after = gap_of(forest, by_plane, way.after, m) - needed
+        if not after > 0.0:
+            continue
+        before = gap_of(forest, by_plane, way.before, m) - needed
+        if stays_apart(forest, by_plane, way, m, (before, after)):
+            keep(front, by_plane, m, pair_proof_at(front.pair, 0).travelled + way.moved + after)
+            return True
+    return False
+
+
+@kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
     """Seek a proof that two nodes are apart: what was found, the direction, both gaps, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
@@ -85,7 +107,10 @@ def part_nodes(forest, front, way, nodes, hint, needed):
     if stays_apart(forest, nodes, way, n, gaps):
         keep(front, nodes, n, travelled + gaps[1])
         return ARE_PARTED, n, gaps, overlap
-    if is_wire(forest, nodes.a) and is_wire(forest, nodes.b) and part_wires(forest, front, way, nodes, needed):
+    if is_wire(forest, nodes.a) and is_wire(forest, nodes.b):
+        if part_wires(forest, front, way, nodes, needed):
+            return ARE_PARTED, n, gaps, overlap
+    elif way.swept and way.factor > 0.0 and part_by_carried(forest, front, way, nodes, n, needed):
         return ARE_PARTED, n, gaps, overlap
     how, room = best_bore(forest, nodes.a, nodes.b, way.after)
     if how != BY_PLANE and room > needed:
@@ -205,6 +230,7 @@ def seek(forest, front, way, limits, tail):
     head, earlier = 0, counts.earlier
     while head < tail:
         if counts.next_count + tail - head + 2 >= room:
+            put_off(front, way.after, way.swept, head, tail)
             return NO_ROOM
         if head % SOUGHT_AT_ONCE == SOUGHT_AT_ONCE - 1 and is_over(limits):
             put_off(front, way.after, way.swept, head, tail)
@@ -235,7 +261,10 @@ def seek(forest, front, way, limits, tail):
             counts.opened += 1
             keep(front, Parted(nodes.a, nodes.b, LEFT_OPEN), n, -math.inf)
             continue
-        if not divide(forest, front, nodes, way.after, n, tail, max(way.sag - gaps[1], 0.0)):
+        # They are as far from being parted all the way as at the end where they are farther from it.
+        short = max(way.sag - min(gaps[0], gaps[1]), 0.0)
+        if not divide(forest, front, nodes, way.after, n, tail, short):
+            put_off(front, way.after, way.swept, head - 1, tail)
             return NO_ROOM
         tail += 2
     return OPEN if counts.opened > 0 else CLEAR
@@ -272,7 +301,7 @@ def look(forest, front, pose, limits, swept):
     if code == CLEAR:
         replace_front(front, pose, travelled)
         pair.underway = 0.0
-    elif code != SPENT:
+    elif code != SPENT and code != NO_ROOM:
         leave_off(front)
     return code
 
@@ -282,8 +311,8 @@ def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
     `part` of the pair's record is the part of the way that is proven clear. If it is not the whole way, the last pose
-    stays as it was; but if the time is over, it becomes the pose up to which the way is clear, and the next call goes
-    on from there. SHORTEST is a part of the whole way, not of the way that is left: that always has a half.
+    stays as it was; but if the time is over, or memory full, it becomes the pose up to which the way is clear, and the
+    next call goes on from there. SHORTEST is a part of the whole way, not of what is left: that always has a half.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
@@ -314,13 +343,13 @@ def go_to(forest, front, pose, limits):
                 # As far as what has just failed.
                 step *= 0.5
     pair.part = 1.0 if done == 1.0 else behind + (1.0 - behind) * done
-    if code == SPENT:
+    if code == SPENT or code == NO_ROOM:
         pair.aim_part = 1.0 if to == 1.0 else (to - done) / (1.0 - done)
         pair.behind = pair.part
         for k in range(9):
             pair.origin_turn[k] = origin.rotation[k]
         put(pair.origin_shift, origin.shift)
-        return SPENT
+        return code
     if code != CLEAR and pair.part > 0.0:
         pair.travelled += way_of(last_pose(front), origin, center, root.radius, False).moved
         remember(front, origin)

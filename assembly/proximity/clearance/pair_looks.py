@@ -12,7 +12,7 @@ from assembly.kinematics.motion import RelativePose, exponential, rotation
 from assembly.proximity.clearance.front import Front, Limits, begin_front, bring_back, first_row, last_pose
 from assembly.proximity.clearance.inside import FOREST
 from assembly.proximity.clearance.look import go_to, look
-from assembly.proximity.clearance.records import CLEAR, OPEN, SPENT, Forest, counts_at, pair_proof_at
+from assembly.proximity.clearance.records import CLEAR, NO_ROOM, OPEN, SPENT, Forest, counts_at, pair_proof_at
 from assembly.proximity.clearance.separation import separation
 
 # The task of a pair: none; to look at a pose; with a new front; at the way there; with a new front made at the last
@@ -45,9 +45,9 @@ def done_task(forest, front, pose, limits, task):
         code = look(forest, front, last_pose(front), limits, False)
         if code == CLEAR:
             counts.fresh = counts.count
-        elif code == SPENT:
+        elif code == SPENT or code == NO_ROOM:
             counts.fresh = 0
-            return SPENT
+            return code
         else:
             bring_back(front, kept)
     if task == ON_WAY or task == ON_WAY_ANEW:
@@ -56,7 +56,7 @@ def done_task(forest, front, pose, limits, task):
         begin_front(front)
     code = look(forest, front, pose, limits, task == ON_WAY_AT_ONCE)
     if task == BEGUN_ANEW:
-        counts.fresh = 0 if code == SPENT else counts.count
+        counts.fresh = 0 if code == SPENT or code == NO_ROOM else counts.count
     pair.part = 1.0 if code == CLEAR else 0.0
     return code
 

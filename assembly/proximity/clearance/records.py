@@ -92,7 +92,7 @@ PAIR = record_dtype(
     far=1,  # the sum of the bodies' largest coordinates
     slimmer=1,  # by so much wires may be in each other: pieces of them that are parted by the distance of their spines
     way_depth=1,  # how far these may be in each other on the way of the last look, at most
-    underway=1,  # of a look whose time was over: TO_POSE, ON_ITS_WAY; else 0
+    underway=1,  # of a look whose time was over, or memory full: TO_POSE, ON_ITS_WAY; else 0
     aim_part=1,  # where it looks, as a part of the way that is still to be proven
     aim_turn=9,  # and the pose there
     aim_shift=3,
@@ -136,17 +136,18 @@ NODES = record_dtype(
     "i8",
     a=1,
     b=1,
-    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE: what parts them; OPEN_YET, LEFT_OPEN
+    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_PLANE_OF_B, BY_SLEEVE: what parts them; OPEN_YET, LEFT_OPEN
 )
 nodes_at = record_view(NODES)
 NODES_SIZE = size_of(NODES)
 # A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines. Of
-# a look whose time was over: nothing yet. The bore of a in which the part of b beside a is, in three ways
-# (`sleeves.py`). Of a look that may go on: nothing, and no more is tried.
-BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, OPEN_YET, BY_SLEEVE = 0, 1, 2, 3, 4, 5
+# a look whose time was over: nothing yet. A plane between them that moves along with b; its direction is in axes of b.
+# The bore of a in which the part of b beside a is, in three ways (`sleeves.py`). Of a look that may go on: nothing, and
+# no more is tried.
+BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, OPEN_YET, BY_PLANE_OF_B, BY_SLEEVE = 0, 1, 2, 3, 4, 5, 6
 LEFT_OPEN = -1
 # How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown;
-# SPENT: the time is over, and the next call goes on.
+# SPENT: the time is over. After both the next call goes on.
 CLEAR, CROSSING, OPEN, NO_ROOM, UNSWEPT, SPENT = 0, 1, 2, 3, 4, 5
-# What a look whose time was over looks at: a pose alone, or the way there as well.
+# What a look that is interrupted looks at: a pose alone, or the way there as well.
 TO_POSE, ON_ITS_WAY = 1.0, 2.0

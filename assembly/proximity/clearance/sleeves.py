@@ -24,7 +24,7 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, neg, scale, sub
 from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.halve import vector
-from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE, BY_SLEEVE, node_at
+from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE, BY_PLANE_OF_B, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import (
     farthest_of_section,
     highest,
@@ -133,6 +133,8 @@ def gap_of(forest, nodes, pose, n):
     """The gap of two nodes, kept apart by a plane of direction n, or by a bore; of spines see `spines.py`."""
     if nodes.how == BY_PLANE:
         return separation(forest, nodes.a, nodes.b, pose, n)
+    if nodes.how == BY_PLANE_OF_B:
+        return separation(forest, nodes.a, nodes.b, pose, matvec(pose.rotation, n))
     if nodes.how == BY_BORE_A:
         return room_in_bore(forest, nodes.a, nodes.b, pose, False)
     if nodes.how >= BY_SLEEVE:

@@ -16,10 +16,10 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, neg, scale, sub
+from assembly.geometry.vec import add, blend, cross, dot, matmul_t, matvec, neg, scale, sub
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import corner_of, vector
-from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
+from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE_OF_B, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed, room_in_bore
 from assembly.proximity.clearance.sleeve_bends import axis_bends, disc_bend, section_bends
 from assembly.proximity.clearance.sleeves import LEAST_COSINE, cosine_of_rulings, sleeve_room, slope_of
@@ -148,6 +148,32 @@ def sag_backward(way, forest, a):
     return 0.125 * angle * (angle * far + 2.0 * math.sqrt(dot(d, d))) * ROUNDED_UP
 
 
+@kernel(inner=True)
+def sag_of_carried(way, forest, a, n):
+    """How far points of node a, at rest, may be off their chords along a direction n that moves along with b.
+
+    n is in axes of b. Seen from b, whose middle is c, a point x is at p.(x - c) along it, with p the direction as it
+    turns. With w the angle, u the axis and q the length of n across that, the second derivative over the way is
+
+        w^2 q |x - c across u| + 2 w |(u x p).c'|
+
+    at most, and u x p is of length q and never turned by more than w / 2 from what it is at one of the ends.
+    """
+    node = node_at(forest.nodes, a)
+    angle = 4.0 * math.asin(min(math.sqrt(0.5 * way.factor), 1.0))
+    start, end = placed(way.before, way.middle), placed(way.after, way.middle)
+    d, e, f = sub(end, start), sub(vector(node.center), start), sub(vector(node.center), end)
+    axis, length = matvec(way.after.rotation, way.axis), math.sqrt(dot(d, d))
+    far = max(across(e, axis), across(f, axis)) + AXIS_OFF * math.sqrt(max(dot(e, e), dot(f, f))) + node.radius
+    part, beside = 1.0, length
+    if dot(axis, axis) > 0.0:
+        part = min(across(n, way.axis) + way.lean, 1.0)
+        first, last = cross(axis, matvec(way.before.rotation, n)), cross(axis, matvec(way.after.rotation, n))
+        most = max(abs(dot(first, d)), abs(dot(last, d))) + (0.5 * angle * part + way.lean + AXIS_OFF) * length
+        beside = min(part * length, most)
+    return 0.125 * angle * (angle * part * far + 2.0 * beside) * ROUNDED_UP
+
+
 @kernel(inline=True)
 def part_along(way, n):
     """Which part of a sag is along the normal n of a plane, at most: a sag is across the axis of rotation."""
@@ -234,15 +260,15 @@ def keeps_room(way, forest, nodes, gaps):
 def stays_apart(forest, nodes, way, n, gaps):
     """Whether what separates two nodes at both poses, by gaps before and after, separates them all the way.
 
-    n is the direction of a plane.
+    n is the direction of a plane, of one that moves along with b in axes of b.
     """
     before, after = gaps
     if not after > 0.0:
         return False
     if not way.swept:
         return True
-    if nodes.how == BY_BORE_B:
-        sag = sag_backward(way, forest, nodes.a)
+    if nodes.how == BY_BORE_B or nodes.how == BY_PLANE_OF_B:
+        sag = sag_backward(way, forest, nodes.a) if nodes.how == BY_BORE_B else sag_of_carried(way, forest, nodes.a, n)
         return after > sag and before > sag
     if nodes.how >= BY_SLEEVE:
         return keeps_room(way, forest, nodes, gaps)

@@ -18,10 +18,19 @@ from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import Front, Parted
 from assembly.proximity.clearance.pair_looks import gap_along
-from assembly.proximity.clearance.records import BY_BORE_A, BY_PLANE, BY_SLEEVE, Forest
+from assembly.proximity.clearance.records import BY_BORE_A, BY_PLANE, BY_PLANE_OF_B, BY_SLEEVE, Forest
 from assembly.proximity.clearance.separation import farthest_of_disc, highest, level_of_disc, room_in_bore, separation
-from assembly.proximity.clearance.sleeves import best_bore
-from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, sag_of_disc, stays_apart, way_of
+from assembly.proximity.clearance.sleeves import best_bore, gap_of
+from assembly.proximity.clearance.way import (
+    Way,
+    part_along,
+    pose_at,
+    sag_of,
+    sag_of_carried,
+    sag_of_disc,
+    stays_apart,
+    way_of,
+)
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import points_of, shapes
@@ -150,6 +159,39 @@ def test_the_level_of_a_disc_in_a_cone(cases):
         assert most <= told + ROUNDING
         # Upright it is exact, but for the samples; else tangents come near, to a part of what the lean is.
         assert told - most <= 1e-5 + 0.5 * radius * lean
+
+
+def test_planes_that_move_along_with_a_body(cases):
+    """Of a box that turns as it goes: on its way gaps along what is fixed to it fall by no more than the sag."""
+    rng, stay, tight = np.random.default_rng(12), 0, 0.0
+    for k in range(cases(60, 4000)):
+        forest = forest_of(faces_of(SHAPES["plate"]), faces_of(asm.shapes.box(1.0, 0.7, 0.5)))
+        a, b = (int(root) for root in forest.roots)
+        size = 10.0 ** rng.uniform(-3.0, -0.3)
+        turn, shift, n = random_turn(rng), 2.5 * direction(rng), direction(rng)
+        if k % 2:
+            n = turn.inv().apply(shift / np.linalg.norm(shift))
+        axis = n if k % 4 == 0 else direction(rng)
+        # Also about an axis across the way, or along it, and on a straight way without a turn.
+        part = [0.0, 1.0, rng.uniform()][k % 3]
+        after = turn * Rotation.from_rotvec(part * size * axis)
+        way = rng.uniform() * size * direction(rng)
+        way = way if k % 5 else np.cross(turn.apply(axis), way)
+        begin, end = relative(turn, shift), relative(after, shift + way)
+        way, nodes = way_between(begin, end, np.zeros(3), 1.0), Parted(a, b, BY_PLANE_OF_B)
+        gaps = tuple(gap_of(packed(forest), nodes, pose, tuple(n)) for pose in (begin, end))
+        assert gaps[1] == pytest.approx(separation(packed(forest), a, b, end, tuple(after.apply(n))), abs=ROUNDING)
+        sag = sag_of_carried(way, packed(forest), a, tuple(n))
+        parts = np.linspace(0.0, 1.0, 17)
+        between = np.array([gap_of(packed(forest), nodes, pose_at(way, float(s)), tuple(n)) for s in parts])
+        below = (gaps[0] + parts * (gaps[1] - gaps[0]) - between).max()
+        assert below <= sag + ROUNDING
+        if sag > 1e-9:
+            tight = max(tight, below / sag)
+        if stays_apart(packed(forest), nodes, way, tuple(n), gaps):
+            stay += 1
+            assert between.min() > 0.0
+    assert stay > 3 and tight > 0.5
 
 
 def test_room_in_a_cone(cases):
