@@ -90,8 +90,7 @@ class Nearest:
 
 def place_of_spot(tree: KeptTree, spot: Spot) -> Place:
     """The face or the boundary curve on which a point of a body is."""
-    face, curve = tree.faces[spot.patch].tolist()
-    low_u, high_u, low_v, high_v = tree.spans[spot.patch].tolist()
+    face, curve, (low_u, high_u, low_v, high_v) = tree.patch_at(spot.patch)
     u = _between(low_u, high_u, spot.x)
     return Place(face, curve, (u, _between(low_v, high_v, spot.y) if curve == NONE else 0.0))
 
