@@ -146,6 +146,7 @@ TREE_NODE = record_dtype(
     high_u=1,
     low_v=1,
     high_v=1,
+    support=2,  # of a group or a whole patch, along a direction, as a and as b of the latest search [length]
 )
 tree_node_at = record_view(TREE_NODE)
 MIDDLE = place_of(TREE_NODE, "middle")

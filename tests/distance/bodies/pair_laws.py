@@ -28,8 +28,9 @@ from assembly.distance.bodies.pair import (
     pair_work_at,
 )
 from assembly.distance.bodies.query import SEARCH
-from assembly.distance.bodies.records import ALL, GROUP, BodyTree
+from assembly.distance.bodies.records import ALL, GROUP, BodyTree, body_head_at
 from assembly.distance.bodies.search import errors_of
+from assembly.distance.bodies.supports import is_planted, write_supports
 from assembly.distance.bodies.trims import falls_to_side, flat_is_elsewhere, is_beside, is_flat_inside
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import bernstein
@@ -120,8 +121,42 @@ def node_difference(a, i, b, j, matrix, shift, normal):
     return d - (d @ normal) * normal
 
 
+def points_of(tree, k):
+    """Points of a node; of a group those of all its patches."""
+    links = links_of(tree, k)
+    if links.patch != GROUP:
+        return grid_of(tree, k).reshape(-1, 3)
+    return np.concatenate([points_of(tree, int(links.halves) + i) for i in range(2)])
+
+
+def supports(rounds):
+    """Supports are below n.P of all points of groups and patches; those of round faces reach these."""
+    rng = np.random.default_rng(2)
+    ring = (Face(asm.shapes.torus(1.0, 0.3)),)
+    shapes = [*solids().values(), *((face,) for face in trimmed_faces(rng).values()), ring]
+    trees = [BodyTree(*tree_of(tuple(faces)).arrays) for faces in shapes]
+    for _ in range(rounds):
+        tree, side = trees[int(rng.integers(len(trees)))], int(rng.integers(2))
+        n = rng.standard_normal(3) * rng.choice([0.0, 1.0], 3, p=[0.2, 0.8])
+        n = n / np.linalg.norm(n) if n.any() else np.array([0.0, 0.0, 1.0])
+        best = write_supports(tree, side, tuple(n))
+        root = node_of(tree, 0).support[side]
+        for k in range(2 * int(body_head_at(tree.pool, 0).patches) - 1):
+            assert is_planted(tree, k)
+            support = node_of(tree, k).support[side]
+            assert support <= (points_of(tree, k) @ n).min() + TIGHT
+            assert root <= support
+        assert links_of(tree, best).patch != GROUP and node_of(tree, best).support[side] == root
+        # From outside its tube a torus is supported by itself, whatever its control points are.
+        tree = trees[-1]
+        write_supports(tree, side, tuple(n))
+        reach = 0.3 + math.hypot(n[0], n[1])
+        assert abs(node_of(tree, 0).support[side] + reach) <= 1e-12
+
+
 def main(rounds):
     flat_pairs(4 * rounds)
+    supports(rounds)
     rng = np.random.default_rng(0)
     told = dict.fromkeys(("ball", "hull", "model", "proof", "fall"), 0)
     for k in range(rounds):
