@@ -75,7 +75,7 @@ class KeptTree:
         """Room for as many halvings, and twice as many nodes where there is none."""
         table, pool, links, nodes, nets = self.arrays
         # TREE_STATE, which a record would take longer to read.
-        count, used_nets = links[:USED].tolist()
+        count, used_nets = links.item(0), links.item(1)
         needed = 14 * (self.degree + 1) ** 2 * halvings
         if (count + 2 * halvings) * NODE <= nodes.size and used_nets + needed <= nets.size:
             return

@@ -61,6 +61,9 @@ class BodyDistance(ReadOnlyArrays):
     evaluations: int
     _where: tuple[tuple[Faces, Faces], Nearest, Array] = field(repr=False)
 
+    def __post_init__(self) -> None:
+        """Nothing to protect: the points of a search are read-only."""
+
     @property
     def converged(self) -> bool:
         """Whether the bounds are within the tolerance."""
