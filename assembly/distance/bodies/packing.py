@@ -39,7 +39,7 @@ Ints = NDArray[np.int64]
 Arrays = tuple[Ints, Array, Ints, Array, Array]
 _HEAD = size_of(BODY_HEAD)
 _PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
-_FACE_AT, _SPAN_AT = place_of(PATCH, "face"), place_of(PATCH, "span")
+_FACE_AT, _SPAN_AT, _BORDER_AT = (place_of(PATCH, name) for name in ("face", "span", "border"))
 # Before center and half of a BODY_HEAD.
 _HEAD_NUMBERS: tuple[str, ...] = (BODY_HEAD.names or ())[:-2]
 # Nodes for which there is room at first, beside the whole patches.
@@ -179,6 +179,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
     more: list[Ints] = []
     table_at, first = table.size, 0
     spine_of_face: dict[int, int] = {}
+    borders: dict[int, int] = {}
     for block in blocks:
         trim = NONE
         # A curve lies on what its face is.
@@ -199,8 +200,13 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
         values = {
             "degree_u": p, "degree_v": q, "face": block.face, "curve": block.curve, "sign": block.sign,
             "single": int(block.curve == NONE and n == 1), "node": NONE, "net": NONE,
-            "tables_u": at[p], "tables_v": at[q], "span": tables.size, "trim": trim, "spine": place,
+            "tables_u": at[p], "tables_v": at[q], "span": tables.size, "trim": trim, "spine": place, "border": NONE,
         }  # fmt: skip
         table[first : first + n] = [values[name] for name in _PATCH_FIELDS]
+        if block.curve != NONE and block.face not in borders:
+            borders[block.face] = first
         first += n
+    for face, border in borders.items():
+        of_face = (table[:, _FACE_AT] == face) & (table[:, _FACE_AT + 1] == NONE)
+        table[of_face, _BORDER_AT] = border
     return np.concatenate([table.ravel(), *more]) if more else table.ravel(), np.concatenate(parts)

@@ -90,6 +90,7 @@ PATCH = record_dtype(
     span=1,  # where in the pool its PATCH_SPAN is
     trim=1,  # where in the table the trim of its face is; NONE: all of it is of the face
     spine=1,  # where in the pool its SPINE is; NONE: it is neither an elementary surface nor a line or a circle
+    border=1,  # of a trimmed plane: the first patch of its face's boundary, one after the other; NONE
 )
 patch_at = record_view(PATCH)
 PATCH_SIZE = size_of(PATCH)

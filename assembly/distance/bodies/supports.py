@@ -1,7 +1,8 @@
 """Bounds of all patches of two bodies along one direction: where a plane parts the bodies, one look ends the search.
 
 The support of a node is a lower bound of n.P of its points, for one unit vector n: of a patch the least of its control
-points, or that of the elementary surface on which it lies; of a group the least of its patches. Supports of two nodes
+points, or that of the elementary surface on which it lies, of a trimmed plane that of its boundary, within whose hull
+it is; of a group the least of its patches. Supports of two nodes
 bound their distance as control points do, for groups as well. So they bound the distance of two convex bodies by itself
 if n is along their nearest points; and the patches with the least supports are where a search for these goes on.
 """
@@ -12,9 +13,10 @@ import math
 
 from assembly._kernel import kernel
 from assembly.distance.bodies.descent import body_search_at, descend_from_nodes
-from assembly.distance.bodies.nodes import is_group, links_of, node_of
+from assembly.distance.bodies.nodes import is_group, links_of, node_of, patch_of
 from assembly.distance.bodies.pair import least_of
-from assembly.distance.bodies.records import body_head_at
+from assembly.distance.bodies.records import NONE, body_head_at, spine_at
+from assembly.distance.bodies.spines import PLANE
 from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot, matvec_t, neg
@@ -31,19 +33,38 @@ def is_planted(tree, k):
     return k < 2 * int(body_head_at(tree.pool, 0).patches) - 1
 
 
+@kernel(inline=True)
+def least_of_border(tree, k, side):
+    """The least support of the boundary of the trimmed plane that patch k is of."""
+    face, m, least = patch_of(tree, k).face, patch_of(tree, k).border, math.inf
+    off = spine_at(tree.pool, patch_of(tree, k).spine).off
+    count = int(body_head_at(tree.pool, 0).patches)
+    while m < count and patch_of(tree, m).face == face:
+        least = min(least, node_of(tree, patch_of(tree, m).node).support[side])
+        m += 1
+    return least - 2.0 * off
+
+
 @kernel(inner=True)
 def write_supports(tree, side, n):
-    """Write the supports of all groups and patches of a body that is on a side of a search; the patch of the least."""
+    """Write the supports of all groups and patches of a body that is on a side of a search; the node of the least."""
     least, best = math.inf, 0
-    for k in range(2 * int(body_head_at(tree.pool, 0).patches) - 2, -1, -1):
+    count = int(body_head_at(tree.pool, 0).patches)
+    # Curves of boundaries are behind the patches of faces.
+    for m in range(count - 1, -1, -1):
+        patch = patch_of(tree, m)
+        support = least_of(tree, patch.node, n)
+        if patch.border != NONE and patch.spine != NONE and spine_at(tree.pool, patch.spine).kind == PLANE:
+            support = max(support, least_of_border(tree, m, side))
+        node_of(tree, patch.node).support[side] = support
+        if support < least:
+            least, best = support, patch.node
+    for k in range(2 * count - 2, -1, -1):
         if is_group(tree, k):
             half = links_of(tree, k).halves
-            support = min(node_of(tree, half).support[side], node_of(tree, half + 1).support[side])
-        else:
-            support = least_of(tree, k, n)
-            if support < least:
-                least, best = support, k
-        node_of(tree, k).support[side] = support
+            node_of(tree, k).support[side] = min(
+                node_of(tree, half).support[side], node_of(tree, half + 1).support[side]
+            )
     return best
 
 

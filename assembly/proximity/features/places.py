@@ -102,7 +102,8 @@ def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     """The vertex, the edge or the face on which a point of a body is, to the tolerance of its topology."""
     topology, names = solid_of(faces), features_of(faces)
     if topology.vertices:
-        apart = ((_vertex_points(faces) - point) ** 2).sum(axis=1)
+        off = _vertex_points(faces) - point
+        apart = np.einsum("ij,ij->i", off, off)
         nearest = int(apart.argmin())
         if apart[nearest] <= topology.tolerance**2:
             return names[len(topology.faces) + len(topology.edges) + nearest]

@@ -23,6 +23,7 @@ SHAPES = asm.shapes
 # Bounds of a search for 1e-10 are that far from each other; closed forms are off by some units of the last place.
 TOLERANCE = 1e-10
 TIGHT = 1e-14
+HOLE = [(0.0, 0.0, 0.3)]
 
 
 def at(x, y=0.0, z=0.0):
@@ -251,6 +252,23 @@ def test_convex_solids_are_parted_by_a_plane_at_once(cases):
             pairs.append(found.evaluations)
     # Of 676 pairs of faces.
     assert np.median(pairs) <= 10 and len(pairs) > 20
+
+
+def test_trimmed_planes_are_parted_by_their_boundaries():
+    # Planes of trimmed faces go on beyond these, and so do their control points.
+    plate, washer = SHAPES.plate(12.0, 3.0, 0.5, [(-4.0, 0.4, 0.3), (4.0, 0.4, 0.3)]), SHAPES.plate(0.8, 0.8, 0.4, HOLE)
+    for gap in (0.1, 5.0):
+        found = check(plate, washer, (None, at(4.0, 0.4, -0.45 - gap)), gap)
+        assert found.evaluations <= 20
+
+
+def test_a_descent_goes_on_along_the_rim_that_is_near():
+    # Rims of two holes lie on each other; beside them is the ball of a long edge.
+    plate, washer = SHAPES.plate(4.0, 4.0, 0.5, [(0.9, 0.4, 0.3)]), SHAPES.plate(1.0, 1.0, 0.4, HOLE)
+    for order in (1, -1):
+        found = distance(*(plate, washer)[::order], poses=(None, at(0.9, 0.4, 0.45))[::order])
+        assert found.converged and found.lower == 0.0
+        assert found.evaluations <= 20
 
 
 def test_a_budget_leaves_true_bounds():
