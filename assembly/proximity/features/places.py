@@ -39,14 +39,14 @@ in_child(body_tree.cache_clear)
 
 @lru_cache(maxsize=256)
 def is_closed(faces: Faces) -> bool:
-    """Whether a body bounds a region."""
-    return solid_of(faces).is_closed
+    """Whether a body bounds a region; a surface without a boundary does, which needs no topology."""
+    return (len(faces) == 1 and not faces[0].boundary) or solid_of(faces).is_closed
 
 
 @lru_cache(maxsize=256)
 def shells_of(faces: Faces) -> tuple[Faces, ...]:
-    """The faces of a body by parts that no edge joins."""
-    return pieces_of(solid_of(faces))
+    """The faces of a body by parts that no edge joins; one face is one part."""
+    return (faces,) if len(faces) == 1 else pieces_of(solid_of(faces))
 
 
 def pieces_of(topology: Topology) -> tuple[Faces, ...]:

@@ -16,6 +16,8 @@ from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity import DistanceStatus, FeatureStatus, closest_features, distance, minimum_distance
+from assembly.proximity.brep.solid import solid_of
+from assembly.proximity.features.places import is_closed
 from benchmarks.distances import rounded_box
 from tests.distance.bodies.example_shapes import HALF, ellipse, points_on, random_pose, solids, trimmed_faces, wavy
 
@@ -378,6 +380,17 @@ def test_a_ball_in_a_ring_comes_out_some_way():
     assert abs(found.depth - 0.6) < 1e-10 and not found.proved
     apart = distance(ring, ball, poses=(None, at(4.0)))
     assert apart.depth is None and apart.translation is None and apart.proved
+
+
+def test_a_surface_without_a_boundary_is_closed_as_its_topology_says():
+    torus = SHAPES.torus(1.0, 0.3)
+    surfaces = [SHAPES.sphere(1.0), SHAPES.ellipsoid(1.0, 0.8, 0.6), torus, SHAPES.cylinder(1.0, 2.0)]
+    surfaces += [SHAPES.cone(1.0, 2.0), SHAPES.plane(1.0, 1.0), wavy(np.random.default_rng(0))]
+    faces = [Face(surface) for surface in surfaces]
+    faces += [Face(torus, holes=[ellipse(0.0, 0.0, 0.5, 0.3)]), Face(SHAPES.sphere(1.0), reversed=True)]
+    said = [is_closed((face,)) for face in faces]
+    assert said == [solid_of((face,)).is_closed for face in faces]
+    assert any(said) and not all(said)
 
 
 def test_what_is_beside_or_in_a_cavity_is_not_inside():
