@@ -20,8 +20,10 @@ ABOUT = """\
 Calls of `asm.proximity.distance` from Python. "Again" is the least of ten calls at one pose, "a new pose" the median of
 twelve poses of the same shapes, "first" a call with shapes that were never asked before; each is the median over the
 pairs. Patches: wavy bicubic ones of one span, half of them rational, side by side at random orientations. Convex sides:
-two ellipsoids at a known gap. Rounded boxes: 6 planes, 12 quarters of cylinders and 8 eighths of balls each. A count is
-of answers whose bounds are 1e-10 apart or less, and have the distance between them where it is known."""
+two ellipsoids at a known gap. Rounded boxes: 6 planes, 12 quarters of cylinders and 8 eighths of balls each. Domes in
+bowls: paraboloids as bicubic sheets, the dome's two curvatures 1.02 to 2.5 times the larger one of the bowl's, over its
+lowest point and turned about the axis; of a dome 1.02 to 1.1 times as curved the surfaces nearly conform. A count is of
+answers whose bounds are 1e-10 apart or less, and have the distance between them where it is known."""
 
 Array = NDArray[np.float64]
 Shape = Any
@@ -107,6 +109,28 @@ def _ellipsoids(about_z: Callable[[tuple[float, float, float]], Pose], gap: floa
     )
 
 
+def _paraboloid(curvatures: Array, side: float) -> asm.NurbsSurface:
+    """z = (k x^2 + l y^2) / 2 over a square about the origin, of degree (3, 3)."""
+    x, y = np.meshgrid(*2 * [np.linspace(-side, side, 3)], indexing="ij")
+    # Bezier points of x^2.
+    square = side**2 * np.array([1.0, -1.0, 1.0])
+    z = 0.5 * (curvatures[0] * square[:, None] + curvatures[1] * square)
+    knots = np.repeat([0.0, 1.0], 3)
+    return asm.NurbsSurface(np.stack([x, y, z], axis=2), (knots, knots), (2, 2)).elevate((3, 3))
+
+
+def _dome_in_bowl(
+    rng: np.random.Generator, about_z: Callable[[tuple[float, float, float]], Pose], gap: float, most: float
+) -> _Case:
+    """No horizontal section of the dome, whose curvatures are larger, is nearer to the bowl than its lowest point."""
+
+    def make() -> tuple[Shape, Shape]:
+        bowl = rng.uniform(0.3, 1.0, 2)
+        return _paraboloid(bowl, 1.0), _paraboloid(bowl.max() * rng.uniform(1.02, most, 2), 0.5)
+
+    return _Case(make, lambda: about_z((0.0, 0.0, gap)), gap)
+
+
 def _cases(rng: np.random.Generator) -> dict[str, _Case]:
     def far(length: float) -> Array:
         way = rng.normal(size=3)
@@ -135,7 +159,11 @@ def _cases(rng: np.random.Generator) -> dict[str, _Case]:
             lambda: (shapes.cylinder(1.0, 3.0), shapes.cylinder(1.0, 2.0)), lambda: about_z((2.5, 0.0, 0.3)), 0.5
         ),
     }
-    return cases | {f"convex sides at a gap of {gap:g}": _ellipsoids(about_z, gap) for gap in (1e-2, 1e-4, 1e-6)}
+    for gap in (1e-2, 1e-4, 1e-6):
+        cases[f"convex sides at a gap of {gap:g}"] = _ellipsoids(about_z, gap)
+    for gap in (1e-2, 1e-4, 1e-6):
+        cases[f"dome in a bowl at a gap of {gap:g}"] = _dome_in_bowl(rng, about_z, gap, 2.5)
+    return cases | {"dome in a bowl of nearly its curvatures": _dome_in_bowl(rng, about_z, 1e-4, 1.1)}
 
 
 # Of each case: a call again, at a new pose, and the first one [s]; None where no figure is asked for.
@@ -147,6 +175,7 @@ REACH = {
     "parallel cylinders": (20e-6, None, None),
 }
 CONVEX = (0.3e-3, None, None)
+BOWL = (3e-3, None, None)
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -156,7 +185,9 @@ def run(quick: bool) -> dict[str, Any]:
     for name, case in _cases(np.random.default_rng(0)).items():
         case.run(2 if quick else 12)
         times = (case.again, case.new, case.first)
-        for kind, seconds, reach in zip(("again", "a new pose", "first"), times, REACH.get(name, CONVEX), strict=True):
+        for kind, seconds, reach in zip(
+            ("again", "a new pose", "first"), times, REACH.get(name, BOWL if "bowl" in name else CONVEX), strict=True
+        ):
             # The first call with the first pair loads kernels.
             measured = statistics.median(seconds[1:] if kind == "first" else seconds)
             figures.append(figure(f"{name}, {kind}", "seconds", measured, reach=reach))

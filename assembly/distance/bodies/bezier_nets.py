@@ -2,8 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 from assembly._kernel import kernel
 from assembly._lanes import load_lanes, store_lanes
+
+
+@kernel(signatures="(UniTuple(f8[::1], 2), UniTuple(f8, 3), f8[::1])")
+def write_points(given, center, points):
+    """Homogeneous control points about a center, weights at most one; the largest coordinate and the least weight.
+
+    `given`: control points and weights of a surface, one after the other.
+    """
+    places, weights = given
+    least, heaviest = math.inf, 0.0
+    for i in range(weights.size):
+        least, heaviest = min(least, weights[i]), max(heaviest, weights[i])
+    largest = 0.0
+    for i in range(weights.size):
+        w = 1.0 if least == heaviest else weights[i] / heaviest
+        for c in range(3):
+            x = places[3 * i + c] - center[c]
+            largest = max(largest, abs(x))
+            points[4 * i + c] = w * x
+        points[4 * i + 3] = w
+    return largest, least / heaviest
 
 
 @kernel(inline=True)

@@ -50,7 +50,8 @@ def boundary_patches(face: Face, patches: PatchBlock, only: int | None = None) -
             t = low + (high - low) * begin, low + (high - low) * end
             spans = np.array([[*t, 0.0, 1.0]])
             error = patches.error + points.error
-            yield PatchBlock(points.net[None, :, None], spans, patches.face, number, face.sign, False, error)
+            lightest = float(points.net[:, 3].min())
+            yield PatchBlock(points.net[None, :, None], spans, patches.face, number, face.sign, False, error, lightest)
 
 
 def _parts(face: Face, only: int | None) -> Iterator[tuple[int, float, float, Array]]:

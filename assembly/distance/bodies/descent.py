@@ -16,7 +16,7 @@ from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.pair import pair_work_at
 from assembly.distance.bodies.records import NONE, body_head_at, patch_span_at
-from assembly.distance.bodies.spines import norm, spine_bound
+from assembly.distance.bodies.spines import SPHERE, Spine, norm, of_sphere, spine_bound, spine_of
 from assembly.distance.patches.newton import fill_basis, newton_direction
 from assembly.distance.patches.pair import (
     BASIS,
@@ -61,6 +61,9 @@ BODY_SEARCH = record_dtype(
     key=1,  # bound of the pair in hand
     tried=1,  # the best bound that a direction gave of the pair in hand
     key_way=3,  # the direction that gave it; before that, the direction of the parent pair
+    parted=1,  # the upper bound when supports were written; infinite: they were not yet [length]
+    parted_shift=1,  # the shift of the pose along their direction [length]
+    parted_pairs=1,  # pairs examined when they were written
     rings=2,  # places of the spines of two tori
     rings_apart=1,  # a lower bound of the distance of these
     on_a=3,  # points in hand, from a's center and in a's axes
@@ -73,6 +76,8 @@ BodyMerit = namedtuple("BodyMerit", "merit")
 _STEPS = 30
 # How often a descent crosses sides of patches: a quarter of a turn each, on both bodies.
 _CROSSINGS = 4
+# Of boundary curves that are equally near to a point, by this part of it the distance to their middles decides.
+_NEARER_MIDDLE = 1e-3
 
 
 @kernel(inner=True)
@@ -308,14 +313,23 @@ def descend_across_sides(search):
 
 @kernel(inner=True)
 def nearest_boundary(tree, face, point):
-    """The patch of the boundary of a face whose ball is nearest to a point, relative to the center of the body."""
+    """The patch of the boundary of a face that is nearest to a point, relative to the center of the body.
+
+    Its ball tells it, and its line or its circle: the ball of a long line has points that are far from it. Of parts of
+    one circle, the one whose middle is nearer.
+    """
     best, least = NONE, math.inf
+    place = Spine(SPHERE, (point[0], point[1], point[2]), (0.0, 0.0, 1.0), 0.0, 0.0, 0.0)
     for k in range(int(body_head_at(tree.pool, 0).patches)):
         patch = patch_of(tree, k)
         if patch.curve != NONE and patch.face == face:
             node = node_of(tree, patch.node)
             apart = sub(node.middle, point)
-            far = math.sqrt(dot(apart, apart)) - node.radius
+            middle = math.sqrt(dot(apart, apart))
+            far = max(0.0, middle - node.radius)
+            if patch.spine != NONE:
+                far = max(far, of_sphere(place, spine_of(tree.pool, patch.spine)))
+            far += _NEARER_MIDDLE * middle
             if far < least:
                 best, least = k, far
     return best

@@ -33,7 +33,7 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
     center : (3,)
         What was subtracted from its points.
     """
-    if block.curve == NONE and not np.ptp(face.surface.control_points.reshape(-1, 3), axis=0).any():
+    if block.curve == NONE and _is_point(face):
         # A point is a ball of no radius.
         row = np.zeros(SPINE_SIZE)
         spine = spine_at(row, 0)
@@ -58,6 +58,11 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
     return row
 
 
+def _is_point(face: Face) -> bool:
+    low, high = face.surface.bounding_box()
+    return bool(low.tolist() == high.tolist())
+
+
 def _is_free(block: PatchBlock, face: Face, center: Array) -> bool:
     """Whether the patches of a face tell that it is no elementary surface."""
     surface = face.surface
@@ -65,9 +70,9 @@ def _is_free(block: PatchBlock, face: Face, center: Array) -> bool:
     if not size > 0.0:
         return True
     low, high = surface.bounding_box()
-    loose = loose_of(exactness(size, float(np.maximum(-low, high).max())) / size)
-    at_u, at_v = surface.breaks()
-    pieces = block.nets.reshape(at_u.size - 1, at_v.size - 1, *block.nets.shape[1:])
+    loose = loose_of(exactness(size, max(-min(low.tolist()), max(high.tolist()))) / size)
+    spans = 1 if len(block.nets) == 1 else surface.breaks()[0].size - 1
+    pieces = block.nets.reshape(spans, -1, *block.nets.shape[1:])
     return has_no_motion(pieces, 0.5 * low + 0.5 * high - center, size, loose)
 
 

@@ -14,6 +14,7 @@ from assembly.distance.bodies.records import (
     NODE,
     NONE,
     PATCH_SIZE,
+    SPAN,
     UNPLACED,
     USED,
     BodyTree,
@@ -235,15 +236,35 @@ def describe_group(tree, k, spare, order, ends):
     sort_along(tree, spare, order, ends, axis)
 
 
-@kernel(signatures="(UniTuple(i8[::1], 2), UniTuple(f8[::1], 3), i8[::1])")
+@kernel(inner=True)
+def place_patches(tree, given, count):
+    """Copy the rows (w x, w y, w z, w) of all patches, one after the other, to their places, and write these places.
+
+    Of the places of spans that of the first patch is known.
+    """
+    source = at = 0
+    span = patch_of(tree, 0).span
+    for i in range(count):
+        patch = patch_of(tree, i)
+        patch.net, patch.span = at, span + SPAN * i
+        size = 4 * (patch.degree_u + 1) * (patch.degree_v + 1)
+        for k in range(size):
+            tree.nets[at + k] = given[source + k]
+        source += size
+        at += net_size(patch)
+    tree_state_at(tree.links, 0).nets = at
+
+
+@kernel(signatures="(UniTuple(i8[::1], 2), UniTuple(f8[::1], 4), i8[::1])")
 def plant_tree(ints, doubles, order):
     """Make nodes of all patches, whose control nets are given, under a tree of groups with root 0.
 
-    `ints`: table and links; `doubles`: pool, nodes and nets; `order` (5 n) is scratch.
+    `ints`: table and links; `doubles`: pool, nodes, nets, and the given rows of nets; `order` (5 n) is scratch.
     A group is split at the median of its patches, sorted along the longest side of the box of their middles.
     """
     tree = BodyTree(ints[0], doubles[0], ints[1], doubles[1], doubles[2])
     count = order.size // 5
+    place_patches(tree, doubles[3], count)
     begin, end = count, 3 * count
     error = body_head_at(tree.pool, 0).error
     # Nodes of patches are first made at the end of the array, and then moved to their places in the tree.

@@ -26,7 +26,6 @@ from assembly.distance.bodies.records import (
     PATCH,
     PATCH_SIZE,
     SPAN,
-    TREE_STATE,
     USED,
 )
 from assembly.geometry.faces.face import Face
@@ -39,11 +38,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Arrays = tuple[Ints, Array, Ints, Array, Array]
 _HEAD = size_of(BODY_HEAD)
-_USED_NETS = place_of(TREE_STATE, "nets")
 _PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
-_SPAN_AT, _NET_AT, _FACE_AT = (place_of(PATCH, name) for name in ("span", "net", "face"))
+_FACE_AT, _SPAN_AT, _BORDER_AT = (place_of(PATCH, name) for name in ("face", "span", "border"))
+# Before center and half of a BODY_HEAD.
+_HEAD_NUMBERS: tuple[str, ...] = (BODY_HEAD.names or ())[:-2]
 # Nodes for which there is room at first, beside the whole patches.
-_SPARE = 256
+_SPARE = 128
 
 
 @dataclass(eq=False)
@@ -56,25 +56,26 @@ class KeptTree:
         Table, pool, links, nodes and nets (`records.BodyTree`).
     degree : int
         The largest degree of a patch in one direction.
-    faces : (patches, 2)
-        Numbers of the face and of the boundary curve of each patch.
-    spans : (patches, 4)
-        Low u, high u, low v, high v of each patch on its surface; of a boundary curve its t, and 0 to 1.
     lock
         Searches make nodes: one at a time.
     """
 
     arrays: Arrays
     degree: int
-    faces: Ints
-    spans: Array
     lock: RLock = field(default_factory=RLock)
+
+    def patch_at(self, number: int) -> tuple[int, int, list[float]]:
+        """Face and boundary curve of a patch, and its low u, high u, low v, high v; of a curve its t, and 0 to 1."""
+        table, pool = self.arrays[:2]
+        row = table[PATCH_SIZE * number : PATCH_SIZE * (number + 1)].tolist()
+        span = row[_SPAN_AT]
+        return row[_FACE_AT], row[_FACE_AT + 1], pool[span : span + SPAN].tolist()
 
     def make_room(self, halvings: int) -> None:
         """Room for as many halvings, and twice as many nodes where there is none."""
         table, pool, links, nodes, nets = self.arrays
         # TREE_STATE, which a record would take longer to read.
-        count, used_nets = links[:USED].tolist()
+        count, used_nets = links.item(0), links.item(1)
         needed = 14 * (self.degree + 1) ** 2 * halvings
         if (count + 2 * halvings) * NODE <= nodes.size and used_nets + needed <= nets.size:
             return
@@ -134,24 +135,14 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
     count = sum(len(block.nets) for block in blocks)
     table, pool = _static(faces, blocks, count, center)
     pool[:_HEAD] = _head(blocks, count, center, half)
-    doubles = 7 * max(block.nets[0, ..., 0].size for block in blocks)
-    used = sum(7 * block.nets[..., 0].size for block in blocks)
-    nets = np.empty(used + _SPARE * doubles)
-    starts = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _NET_AT]
-    first = place = 0
-    for block in blocks:
-        n, points = len(block.nets), block.nets[0, ..., 0].size
-        end = place + 7 * n * points
-        nets[place:end].reshape(n, -1)[:, : 4 * points] = block.nets.reshape(n, -1)
-        starts[first : first + n] = np.arange(place, end, 7 * points)
-        first, place = first + n, end
+    points = [block.nets.ravel() for block in blocks]
+    given = points[0] if len(points) == 1 else np.concatenate(points)
+    largest = max((p + 1) * (q + 1) for p, q in (block.degree for block in blocks))
+    nets = np.empty(given.size // 4 * 7 + 7 * _SPARE * largest)
     room = 3 * count + _SPARE
     links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
-    links[_USED_NETS] = used
-    plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
-    of_faces = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _FACE_AT : _FACE_AT + 2]
-    spans = np.concatenate([block.spans for block in blocks])
-    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks), of_faces, spans)
+    plant_tree((table, links), (pool, nodes, nets, given), np.empty(5 * count, dtype=np.int64))
+    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks))
 
 
 def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> list[float]:
@@ -159,38 +150,36 @@ def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> l
     # Control points of boundary curves may be outside of the box of the faces. No weight is above one.
     curves = [block.nets[..., :3] / block.nets[..., 3:] for block in blocks if block.curve != NONE]
     farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
-    lightest = min(float(block.nets[..., 3].min()) for block in blocks)
-    values: dict[str, list[float]] = {
-        "reach": [max(float(half @ half), farthest) ** 0.5 * (1.0 + 8.0 * UNIT)],
-        "error": [max(block.error for block in blocks)],
-        "weight_ratio": [(1.0 + 4.0 * UNIT) / lightest],
-        "rational": [float(lightest != 1.0)],
-        "patches": [count],
-        "degree": [max(sum(block.degree) for block in blocks)],
-        "center": center.tolist(),
-        "half": (half * (1.0 + 8.0 * UNIT)).tolist(),
+    lightest = min(block.lightest for block in blocks)
+    values = {
+        "reach": max(float(half @ half), farthest) ** 0.5 * (1.0 + 8.0 * UNIT),
+        "error": max(block.error for block in blocks),
+        "weight_ratio": (1.0 + 4.0 * UNIT) / lightest,
+        "rational": float(lightest != 1.0),
+        "patches": float(count),
+        "degree": float(max(sum(block.degree) for block in blocks)),
     }
-    return [x for name in BODY_HEAD.names or () for x in values[name]]
+    return [*(values[name] for name in _HEAD_NUMBERS), *center.tolist(), *(half * (1.0 + 8.0 * UNIT)).tolist()]
 
 
-def _patch_row(**fields: int) -> list[int]:
-    """A PATCH as its integers; what is not given is NONE."""
-    return [fields.get(name, NONE) for name in _PATCH_FIELDS]
+@cache
+def _all_tables(degrees: tuple[int, ...]) -> tuple[Array, dict[int, int]]:
+    """A pool with room for a BODY_HEAD and tables of some degrees, and where these begin."""
+    parts = [np.zeros(_HEAD), *(_tables(degree) for degree in degrees)]
+    starts = accumulate(part.size for part in parts)
+    return np.concatenate(parts), dict(zip(degrees, starts, strict=False))
 
 
 def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center: Array) -> tuple[Ints, Array]:
     """Table and pool: what is told of patches, tables of their degrees, spines and trims."""
-    degrees = sorted({degree for block in blocks for degree in block.degree})
-    tables = [_tables(degree) for degree in degrees]
-    spans = np.concatenate([block.spans for block in blocks]).ravel()
-    parts = [np.zeros(_HEAD), *tables, spans]
-    *starts, span_at = accumulate((part.size for part in tables), initial=_HEAD)
-    at = dict(zip(degrees, starts, strict=True))
-    pool_at = span_at + spans.size
+    tables, at = _all_tables(tuple(sorted({degree for block in blocks for degree in block.degree})))
+    parts = [tables, *(block.spans.ravel() for block in blocks)]
+    pool_at = tables.size + SPAN * count
     table = np.empty((count, PATCH_SIZE), dtype=np.int64)
     more: list[Ints] = []
     table_at, first = table.size, 0
     spine_of_face: dict[int, int] = {}
+    borders: dict[int, int] = {}
     for block in blocks:
         trim = NONE
         # A curve lies on what its face is.
@@ -207,12 +196,17 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
             more.append(trim_table)
             parts.append(trim_pool)
             table_at, pool_at = table_at + trim_table.size, pool_at + trim_pool.size
-        p, q = block.degree
-        table[first : first + len(block.nets)] = _patch_row(
-            degree_u=p, degree_v=q, face=block.face, curve=block.curve, sign=block.sign,
-            single=int(block.curve == NONE and len(block.nets) == 1),
-            tables_u=at[p], tables_v=at[q], trim=trim, spine=place,
-        )  # fmt: skip
-        first += len(block.nets)
-    table[:, _SPAN_AT] = span_at + SPAN * np.arange(count)
-    return np.concatenate([table.ravel(), *more]), np.concatenate(parts)
+        (p, q), n = block.degree, len(block.nets)
+        values = {
+            "degree_u": p, "degree_v": q, "face": block.face, "curve": block.curve, "sign": block.sign,
+            "single": int(block.curve == NONE and n == 1), "node": NONE, "net": NONE,
+            "tables_u": at[p], "tables_v": at[q], "span": tables.size, "trim": trim, "spine": place, "border": NONE,
+        }  # fmt: skip
+        table[first : first + n] = [values[name] for name in _PATCH_FIELDS]
+        if block.curve != NONE and block.face not in borders:
+            borders[block.face] = first
+        first += n
+    for face, border in borders.items():
+        of_face = (table[:, _FACE_AT] == face) & (table[:, _FACE_AT + 1] == NONE)
+        table[of_face, _BORDER_AT] = border
+    return np.concatenate([table.ravel(), *more]) if more else table.ravel(), np.concatenate(parts)

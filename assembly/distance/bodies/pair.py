@@ -28,6 +28,8 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.bodies.nodes import links_of, net_size, node_of, patch_of
+from assembly.distance.bodies.records import NONE
+from assembly.distance.bodies.spines import least_of_spine
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot, matvec, matvec_t
 
@@ -88,11 +90,18 @@ def least_along(tree, k, n):
 
 
 @kernel(inline=True)
+def least_of(tree, k, n):
+    """A lower bound of n.P of a part of a patch: by its control points, or the elementary surface that it is on."""
+    low, spine = least_along(tree, k, n), links_of(tree, k).spine
+    return low if spine == NONE else max(low, least_of_spine(tree.pool, spine, n))
+
+
+@kernel(inline=True)
 def hull_bound(pair, a, i, b, j, pose, slack):
-    """Distance of the control points of two nodes along the direction of the frame."""
+    """Distance of two nodes along the direction of the frame, by control points and elementary surfaces."""
     f, m = pair.frame, pair.turned
     n = (f[6], f[7], f[8])
-    low = least_along(a, i, n) + least_along(b, j, (m[6], m[7], m[8]))
+    low = least_of(a, i, n) + least_of(b, j, (m[6], m[7], m[8]))
     return (low - dot(n, pose.shift)) * (1.0 - 16.0 * UNIT) - slack - node_of(a, i).away - node_of(b, j).away
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.distance.bodies.bezier_nets import write_nets
+from assembly.distance.bodies.bezier_nets import write_nets, write_points
 from assembly.distance.bodies.records import NONE
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier_pieces import UNIT
@@ -36,6 +36,8 @@ class PatchBlock:
         Whether parts of the patches may be outside of the face.
     error : float
         How far the patches may be from what was given.
+    lightest : float
+        The least weight.
     """
 
     nets: Array
@@ -45,6 +47,7 @@ class PatchBlock:
     sign: int
     trimmed: bool
     error: float
+    lightest: float
 
     @property
     def degree(self) -> tuple[int, int]:
@@ -81,17 +84,14 @@ def patches_of(face: Face, number: int, center: Array) -> PatchBlock:
     surface = face.surface
     (n, m), (p, q) = surface.weights.shape, surface.degree
     points = np.empty((n, m, 4))
-    np.subtract(surface.control_points, center, out=points[..., :3])
-    reach = float(np.abs(points[..., :3]).max())
-    lightest, heaviest = float(surface.weights.min()), float(surface.weights.max())
-    if lightest != heaviest:
-        weights = surface.weights / heaviest
-        points[..., :3] *= weights[..., None]
-        points[..., 3] = weights
-    else:
-        points[..., 3] = 1.0
+    given = surface.control_points.flatten(), surface.weights.flatten()
+    reach, lightest = write_points(given, tuple(center.tolist()), points.reshape(-1))
+    error = (1.0 if lightest == 1.0 else 2.0) * 16.0 * (p + q + 4) * UNIT * 2.0 * reach
     at_u, at_v = surface.breaks()
     spans_u, spans_v = at_u.size - 1, at_v.size - 1
+    spans = np.empty((spans_u, spans_v, 4))
+    spans[..., 0], spans[..., 1] = at_u[:-1, None], at_u[1:, None]
+    spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
     if spans_u == spans_v == 1 and (n, m) == (p + 1, q + 1) and surface._is_clamped:
         nets = points[None]
     else:
@@ -99,10 +99,8 @@ def patches_of(face: Face, number: int, center: Array) -> PatchBlock:
         rows = np.empty(4 * (spans_u * m + 1) * (p + 1))
         write_nets(points.ravel(), (surface.knots[0].copy(), surface.knots[1].copy()), (n, m, p, q), rows, flat)
         nets = flat[: flat.size - 4 * (q + 1)].reshape(-1, p + 1, q + 1, 4)
-        if lightest == heaviest:
+        if lightest == 1.0:
             nets[..., 3] = 1.0
-    spans = np.empty((spans_u, spans_v, 4))
-    spans[..., 0], spans[..., 1] = at_u[:-1, None], at_u[1:, None]
-    spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
-    error = (1.0 if lightest == heaviest else 2.0) * 16.0 * (p + q + 4) * UNIT * 2.0 * reach
-    return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, face.sign, is_trimmed(face), error)
+        else:
+            lightest = float(nets[..., 3].min())
+    return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, face.sign, is_trimmed(face), error, lightest)

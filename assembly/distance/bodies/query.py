@@ -61,37 +61,38 @@ class Nearest:
     pairs : int
         Pairs of nodes that were looked at.
     points : (2, 3)
-        The nearest points known, world axes.
+        The nearest points known, world axes; read-only.
     """
 
-    __slots__ = ("_row", "lower", "pairs", "points", "status", "upper")
+    __slots__ = ("_state", "lower", "pairs", "points", "status", "upper")
 
     def __init__(self, state: Array, status: int) -> None:
         self.status = status
-        self._row = row = state.tolist()
-        self.lower: float = row[_LOWER]
-        self.upper: float = row[_UPPER]
-        self.pairs = int(row[_PAIRS])
+        # What is not asked for by all stays in the state: a query takes microseconds.
+        self._state = state
+        state.flags.writeable = False
+        self.lower: float = state.item(_LOWER)
+        self.upper: float = state.item(_UPPER)
+        self.pairs = int(state.item(_PAIRS))
         self.points: Array = state[_WORLD : _WORLD + 6].reshape(2, 3)
 
     def facing(self, side: int) -> float:
         """Cosine of the outward normal at the point of a side and the way to the other one; 0 on a boundary curve."""
-        return float(self._row[_FACING + side])
+        return float(self._state.item(_FACING + side))
 
     def is_boxed(self, side: int) -> bool:
         """Whether the box of the body of a side has the point of the other one."""
-        return bool(self._row[_BOXED + side])
+        return bool(self._state.item(_BOXED + side))
 
     def spot(self, side: int) -> Spot:
         """Where the point of a side is on its body."""
-        x, y = self._row[_PLACES + 2 * side : _PLACES + 2 * side + 2]
-        return Spot(int(self._row[_PATCHES + side]), x, y)
+        x, y = self._state[_PLACES + 2 * side : _PLACES + 2 * side + 2].tolist()
+        return Spot(int(self._state.item(_PATCHES + side)), x, y)
 
 
 def place_of_spot(tree: KeptTree, spot: Spot) -> Place:
     """The face or the boundary curve on which a point of a body is."""
-    face, curve = tree.faces[spot.patch].tolist()
-    low_u, high_u, low_v, high_v = tree.spans[spot.patch].tolist()
+    face, curve, (low_u, high_u, low_v, high_v) = tree.patch_at(spot.patch)
     u = _between(low_u, high_u, spot.x)
     return Place(face, curve, (u, _between(low_v, high_v, spot.y) if curve == NONE else 0.0))
 

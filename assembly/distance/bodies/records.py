@@ -90,6 +90,7 @@ PATCH = record_dtype(
     span=1,  # where in the pool its PATCH_SPAN is
     trim=1,  # where in the table the trim of its face is; NONE: all of it is of the face
     spine=1,  # where in the pool its SPINE is; NONE: it is neither an elementary surface nor a line or a circle
+    border=1,  # of a trimmed plane: the first patch of its face's boundary, one after the other; NONE
 )
 patch_at = record_view(PATCH)
 PATCH_SIZE = size_of(PATCH)
@@ -146,6 +147,7 @@ TREE_NODE = record_dtype(
     high_u=1,
     low_v=1,
     high_v=1,
+    support=2,  # of a group or a whole patch, along a direction, as a and as b of the latest search [length]
 )
 tree_node_at = record_view(TREE_NODE)
 MIDDLE = place_of(TREE_NODE, "middle")

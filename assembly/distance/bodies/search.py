@@ -31,6 +31,7 @@ from assembly.distance.bodies.pair import (
 )
 from assembly.distance.bodies.records import NONE, BodyTree, body_head_at, spine_at
 from assembly.distance.bodies.spines import TORUS, norm, seen_spine, spine_bound, spine_of
+from assembly.distance.bodies.supports import is_worth_parting, part_bodies, parted_bound
 from assembly.distance.bodies.trims import flat_is_elsewhere, is_outside
 from assembly.distance.patches.pair import patch_work_at
 from assembly.distance.piece_search import CROWDED, ended
@@ -133,6 +134,8 @@ def pair_bound(search, i, j):
     way = (state.key_way[0], state.key_way[1], state.key_way[2])
     key = state.key
     bound = max(key, ball_bound(a, i, b, j, search.pose, search.errors.slack))
+    if bound < state.limit:
+        bound = max(bound, parted_bound(search, i, j))
     if bound < state.limit and (is_outside(a, i) or is_outside(b, j)):
         bound = math.inf
     if bound < state.limit and links_of(a, i).spine != NONE and links_of(b, j).spine != NONE:
@@ -179,6 +182,11 @@ def branch(search, key, i, j):
     """The halves of the longer of two nodes with the other one; none where the pair is let go."""
     a, b, state = search.a, search.b, body_search_at(search.state, 0)
     state.popped += 1.0
+    if is_worth_parting(search):
+        part_bodies(search)
+    apart = parted_bound(search, i, j)
+    if apart >= state.limit:
+        return max(key, apart), NO_PAIRS
     if state.popped >= state.next_descent and not (is_group(a, i) or is_group(b, j)):
         # A smaller U prunes more pairs: descend from the pair of the least bound.
         state.next_descent += _FIRST_DESCENT + state.popped / 16.0
@@ -264,7 +272,8 @@ def relative_pose_of(a, b, q):
 def start(search):
     """Reset the state of the search, and find first points of both bodies."""
     state = body_search_at(search.state, 0)
-    state.upper = state.limit = state.let_go = math.inf
+    state.upper = state.limit = state.let_go = state.parted = math.inf
+    state.parted_pairs = 0.0
     state.lower = state.pairs = state.popped = state.descents = state.key = 0.0
     state.next_descent = _FIRST_DESCENT
     state.rings[0] = state.rings[1] = NONE

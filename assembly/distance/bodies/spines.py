@@ -150,6 +150,18 @@ def ordered_gap(s, t):
     return of_torus(s, t) if t.kind == TORUS else of_cylinders(s, t)
 
 
+@kernel(inline=True)
+def least_of_spine(pool, at, n):
+    """A lower bound of n.P for points P of a patch on an elementary surface that is no plane, and a unit vector n."""
+    s = spine_of(pool, at)
+    if s.kind == PLANE:
+        return -math.inf
+    across = norm(cross(n, s.axis))
+    reach = s.half * abs(dot(n, s.axis)) + (s.radius * across if s.kind == CYLINDER else s.radius + s.major * across)
+    size = norm(s.center) + s.radius + s.major + s.half
+    return dot(n, s.center) - reach - spine_at(pool, at).off - 16.0 * UNIT * size
+
+
 @kernel(inner=True)
 def spine_bound(a, at_a, b, at_b, pose):
     """Lower bound of the distance of two patches on elementary surfaces, whose places in their pools are given."""

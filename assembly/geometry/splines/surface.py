@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import sqrt
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -120,7 +121,8 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
     def size(self) -> float:
         """Diagonal of the box around the control points."""
         low, high = self._box
-        return float(np.linalg.norm(high - low))
+        across = high - low
+        return sqrt(across.dot(across))
 
     @cached_property
     def closed(self) -> tuple[bool, bool]:
@@ -173,7 +175,7 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
     def _box(self) -> tuple[Array, Array]:
         """The corners of the bounding box, found once."""
         rows = self.control_points.reshape(-1, 3)
-        return rows.min(axis=0), rows.max(axis=0)
+        return np.minimum.reduce(rows), np.maximum.reduce(rows)
 
     def bounding_sphere(self) -> tuple[Array, float]:
         """Center (3,) and radius of a sphere around the control points and so around the surface."""

@@ -15,7 +15,7 @@ from assembly.distance.bodies.query import Nearest, bodies_apart
 from assembly.distance.piece_search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
-from assembly.kinematics.pose import PoseLike, rotation_matrix
+from assembly.kinematics.pose import PoseLike, rotation_of
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
 from assembly.proximity.features.parting import are_balls, parting_translation
 from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, normals_at, shells_of
@@ -61,6 +61,9 @@ class BodyDistance(ReadOnlyArrays):
     evaluations: int
     _where: tuple[tuple[Faces, Faces], Nearest, Array] = field(repr=False)
 
+    def __post_init__(self) -> None:
+        """Nothing to protect: the points of a search are read-only."""
+
     @property
     def converged(self) -> bool:
         """Whether the bounds are within the tolerance."""
@@ -102,7 +105,7 @@ class BodyDistance(ReadOnlyArrays):
         faces, found, q = self._where
         for side, sign in ((0, 1.0), (1, -1.0)):
             if self.features[side].kind == "face":
-                return read_only(sign * rotation_matrix(q[side, 3:]) @ normals_at(faces[side], found.spot(side))[0])
+                return read_only(sign * rotation_of(q[side, 3:]) @ normals_at(faces[side], found.spot(side))[0])
         return None
 
     @cached_property
@@ -110,8 +113,7 @@ class BodyDistance(ReadOnlyArrays):
         """The faces, edges or vertices on which the points are."""
         faces, found, q = self._where
         first, second = (
-            feature_at(faces[k], found.spot(k), rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3]))
-            for k in range(2)
+            feature_at(faces[k], found.spot(k), rotation_of(q[k, 3:]).T @ (self.points[k] - q[k, :3])) for k in range(2)
         )
         return first, second
 
@@ -216,7 +218,7 @@ def _holds(faces: Faces, q: Array, found: Nearest, side: int) -> bool:
         return False
     if abs(found.facing(side)) > _ALONG:
         return found.facing(side) < 0.0
-    turn = rotation_matrix(q[3:])
+    turn = rotation_of(q[3:])
     here, there = (turn.T @ (found.points[k] - q[:3]) for k in (side, 1 - side))
     way = there - here
     return is_behind(faces, found.spot(side), here, way / float(np.linalg.norm(way)))

@@ -39,14 +39,14 @@ in_child(body_tree.cache_clear)
 
 @lru_cache(maxsize=256)
 def is_closed(faces: Faces) -> bool:
-    """Whether a body bounds a region."""
-    return solid_of(faces).is_closed
+    """Whether a body bounds a region; a surface without a boundary does, which needs no topology."""
+    return (len(faces) == 1 and not faces[0].boundary) or solid_of(faces).is_closed
 
 
 @lru_cache(maxsize=256)
 def shells_of(faces: Faces) -> tuple[Faces, ...]:
-    """The faces of a body by parts that no edge joins."""
-    return pieces_of(solid_of(faces))
+    """The faces of a body by parts that no edge joins; one face is one part."""
+    return (faces,) if len(faces) == 1 else pieces_of(solid_of(faces))
 
 
 def pieces_of(topology: Topology) -> tuple[Faces, ...]:
@@ -102,7 +102,8 @@ def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     """The vertex, the edge or the face on which a point of a body is, to the tolerance of its topology."""
     topology, names = solid_of(faces), features_of(faces)
     if topology.vertices:
-        apart = ((_vertex_points(faces) - point) ** 2).sum(axis=1)
+        off = _vertex_points(faces) - point
+        apart = np.einsum("ij,ij->i", off, off)
         nearest = int(apart.argmin())
         if apart[nearest] <= topology.tolerance**2:
             return names[len(topology.faces) + len(topology.edges) + nearest]

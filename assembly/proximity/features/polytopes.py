@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -64,12 +64,20 @@ class Polytope(ReadOnlyArrays):
         """Whether a ball is inside."""
         return float((self.normals @ point - self.heights).max()) < -radius
 
+    @cached_property
+    def _edges(self) -> tuple[Array, Array, Array]:
+        """Where edges begin and their ways to their ends (e, 3), and the squares of their lengths (e,)."""
+        begin = self.corners[self.ends[:, 0]]
+        way = self.corners[self.ends[:, 1]] - begin
+        return begin, way, (way * way).sum(axis=1)
+
     def edge_at(self, point: Array, tolerance: float) -> int | None:
         """The nearest edge, if a point is as near to one as that."""
-        begin = self.corners[self.ends[:, 0]]
-        way, off = self.corners[self.ends[:, 1]] - begin, point - begin
-        part = np.clip((off * way).sum(axis=1) / (way * way).sum(axis=1), 0.0, 1.0)
-        apart = ((off - part[:, None] * way) ** 2).sum(axis=1)
+        begin, way, squares = self._edges
+        off = point - begin
+        part = np.minimum(np.maximum(np.einsum("ij,ij->i", off, way) / squares, 0.0), 1.0)
+        off -= part[:, None] * way
+        apart = np.einsum("ij,ij->i", off, off)
         nearest = int(apart.argmin())
         return nearest if apart[nearest] <= tolerance**2 else None
 

@@ -28,8 +28,9 @@ from assembly.distance.bodies.pair import (
     pair_work_at,
 )
 from assembly.distance.bodies.query import SEARCH
-from assembly.distance.bodies.records import ALL, GROUP, BodyTree
+from assembly.distance.bodies.records import ALL, GROUP, NONE, BodyTree, body_head_at, patch_span_at
 from assembly.distance.bodies.search import errors_of
+from assembly.distance.bodies.supports import is_planted, write_supports
 from assembly.distance.bodies.trims import falls_to_side, flat_is_elsewhere, is_beside, is_flat_inside
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import bernstein
@@ -120,8 +121,48 @@ def node_difference(a, i, b, j, matrix, shift, normal):
     return d - (d @ normal) * normal
 
 
+def points_of(faces, tree, k):
+    """Points of a node, of a trimmed plane those inside its boundary; of a group those of all its patches."""
+    links = links_of(tree, k)
+    if links.patch == GROUP:
+        return np.concatenate([points_of(faces, tree, int(links.halves) + i) for i in range(2)])
+    points, patch = grid_of(tree, k).reshape(-1, 3), patch_of(tree, links.patch)
+    if patch.border == NONE:
+        return points
+    span = patch_span_at(tree.pool, patch.span)
+    u, v = np.meshgrid(np.linspace(span.low_u, span.high_u, COUNT), np.linspace(span.low_v, span.high_v, COUNT))
+    return points.reshape(COUNT, COUNT, 3).swapaxes(0, 1)[faces[patch.face].contains(u, v)]
+
+
+def supports(rounds):
+    """Supports are below n.P of all points of groups and patches; those of round faces reach these."""
+    rng = np.random.default_rng(2)
+    ring = (Face(asm.shapes.torus(1.0, 0.3)),)
+    shapes = [*solids().values(), *((face,) for face in trimmed_faces(rng).values()), ring]
+    trees = [BodyTree(*tree_of(tuple(faces)).arrays) for faces in shapes]
+    for _ in range(rounds):
+        k, side = int(rng.integers(len(trees))), int(rng.integers(2))
+        faces, tree = shapes[k], trees[k]
+        n = rng.standard_normal(3) * rng.choice([0.0, 1.0], 3, p=[0.2, 0.8])
+        n = n / np.linalg.norm(n) if n.any() else np.array([0.0, 0.0, 1.0])
+        best = write_supports(tree, side, tuple(n))
+        root = node_of(tree, 0).support[side]
+        for k in range(2 * int(body_head_at(tree.pool, 0).patches) - 1):
+            assert is_planted(tree, k)
+            support = node_of(tree, k).support[side]
+            assert support <= (points_of(faces, tree, k) @ n).min(initial=math.inf) + TIGHT
+            assert root <= support
+        assert links_of(tree, best).patch != GROUP and node_of(tree, best).support[side] == root
+        # From outside its tube a torus is supported by itself, whatever its control points are.
+        tree = trees[-1]
+        write_supports(tree, side, tuple(n))
+        reach = 0.3 + math.hypot(n[0], n[1])
+        assert abs(node_of(tree, 0).support[side] + reach) <= 1e-12
+
+
 def main(rounds):
     flat_pairs(4 * rounds)
+    supports(rounds)
     rng = np.random.default_rng(0)
     told = dict.fromkeys(("ball", "hull", "model", "proof", "fall"), 0)
     for k in range(rounds):

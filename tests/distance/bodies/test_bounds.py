@@ -11,8 +11,9 @@ from assembly.distance.bodies import query
 from assembly.distance.bodies.descent import body_search_at
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.packing import tree_of
-from assembly.distance.bodies.records import ALL, GROUP, MODEL, BodyTree, body_head_at
+from assembly.distance.bodies.records import ALL, GROUP, MODEL, NONE, BodyTree, body_head_at, patch_span_at, spine_at
 from assembly.distance.bodies.search import search_bodies
+from assembly.distance.bodies.spines import PLANE
 from assembly.distance.piece_search import CROWDED
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import bernstein
@@ -43,31 +44,41 @@ def net_of(tree, k):
     return tree.nets[at : at + 4 * m * n].reshape(m, n, 4)
 
 
-def samples(tree, k, count):
-    """Points of a node about the center of its body; of a group those of all its patches."""
+def samples(tree, k, count, faces=()):
+    """Points of a node about the center of its body, of trimmed planes those of faces; of a group those of its patches.
+
+    A trimmed plane has no more points than its boundary spans.
+    """
     links = links_of(tree, k)
     if links.patch == GROUP:
-        return np.concatenate([samples(tree, int(links.halves) + i, count) for i in range(2)])
-    net = net_of(tree, k)
+        return np.concatenate([samples(tree, int(links.halves) + i, count, faces) for i in range(2)])
+    net, patch = net_of(tree, k), patch_of(tree, links.patch)
     x = np.linspace(0.0, 1.0, count)
     b, c = bernstein(net.shape[0] - 1, x), bernstein(net.shape[1] - 1, x)
     s = np.einsum("xi,yj,ijk->xyk", b, c, net).reshape(-1, 4)
-    return s[:, :3] / s[:, 3:]
+    points = s[:, :3] / s[:, 3:]
+    if patch.border == NONE or patch.spine == NONE or spine_at(tree.pool, patch.spine).kind != PLANE:
+        return points
+    node, span = node_of(tree, k), patch_span_at(tree.pool, patch.span)
+    u, v = (part.ravel() for part in np.meshgrid(x, x, indexing="ij"))
+    u, v = node.low_u + u * (node.high_u - node.low_u), node.low_v + v * (node.high_v - node.low_v)
+    u, v = span.low_u + u * (span.high_u - span.low_u), span.low_v + v * (span.high_v - span.low_v)
+    return points[faces[int(patch.face)].contains(u, v)]
 
 
 def world(tree, points, q):
     return (points + body_head_at(tree.pool, 0).center) @ rotation_matrix(q[3:]).T + q[:3]
 
 
-def check_waiting(a, b, q, budget, most=40):
+def check_waiting(a, b, q, budget, faces=((), ()), most=40):
     """All pairs that wait have bounds below the distance of their samples; how many were positive."""
     state, pairs = searched(a, b, q, budget)
     tree_a, tree_b = BodyTree(*a.arrays), BodyTree(*b.arrays)
     positive = 0
     for pair in pairs[:: max(1, len(pairs) // most)]:
-        p = world(tree_a, samples(tree_a, int(pair.a), 7), q[0])
-        r = world(tree_b, samples(tree_b, int(pair.b), 7), q[1])
-        least = np.sqrt(((p[:, None] - r[None]) ** 2).sum(axis=2).min())
+        p = world(tree_a, samples(tree_a, int(pair.a), 7, faces[0]), q[0])
+        r = world(tree_b, samples(tree_b, int(pair.b), 7, faces[1]), q[1])
+        least = np.sqrt(((p[:, None] - r[None]) ** 2).sum(axis=2).min(initial=np.inf))
         assert pair.bound <= least + TIGHT, (budget, pair.bound, least)
         positive += pair.bound > 0.0
     assert state.lower <= state.upper
@@ -91,9 +102,10 @@ def test_bounds_of_solids_hold_against_samples(cases, budget):
     shapes = [*solids().values(), *((face,) for face in trimmed_faces(rng).values()), (Face(asm.shapes.torus(1, 0.3)),)]
     positive = 0
     for _ in range(cases(6, 200)):
-        a, b = (tree_of(tuple(shapes[int(k)])) for k in rng.integers(len(shapes), size=2))
+        faces = [tuple(shapes[int(k)]) for k in rng.integers(len(shapes), size=2)]
+        a, b = (tree_of(one) for one in faces)
         q = np.stack([random_pose(rng, 0.5), random_pose(rng, 1.5)])
-        positive += check_waiting(a, b, q, budget)
+        positive += check_waiting(a, b, q, budget, faces)
     assert positive > 5
 
 
