@@ -35,7 +35,6 @@ KEPT_HEADER = record_dtype(
     has_rows=1,  # 1: rows and their derivatives
     version=1,  # of the pool
     factor=1,  # NO_FACTOR, or which solve made it
-    corrected=1,  # 1: with the factor is what corrected the tangent step of the solve that ended here
 )
 kept_header_at = record_view(KEPT_HEADER)
 HEADER = size_of(KEPT_HEADER)
@@ -48,15 +47,10 @@ NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
 # (0: it did not count). `numbers`: of every contact its clearance number. At these poses: the records of `contacts`,
 # `joints` and vector `trims`, and the `jacobian` without the columns of lifted pairs. At these poses or others close
 # by: `factor`, the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it.
-# `course`: of the solve that ended here, in chord steps.
 Kept = namedtuple(
     "Kept",
-    "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor course",
+    "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor",
 )
-# `tangent`: the first step of a solve. `correction`: the sum of the others, and `forces`: of the changes of multipliers
-# that came with them, of every row. `trend`, `forces_trend`: by how much the next such sum will be larger, if one solve
-# is like the other.
-Course = namedtuple("Course", "tangent correction trend forces forces_trend")
 
 
 @kernel(inline=True)
@@ -65,8 +59,8 @@ def kept_size(table):
     header = header_at(table, 0)
     n, columns = kept_unknowns(table), FREE_COLUMN + 6 * header.extra
     records = (header.contacts + header.vector_trims) * CONTACT_RECORD + header.joints * JOINT_FRAMES
-    by_row = header.rows * (5 + columns + EXTRA_COLUMN + 6 * header.extra)
-    return HEADER + 7 * header.bodies + header.tracked + by_row + records + n * (n + 1) // 2 + 3 * n
+    by_row = header.rows * (3 + columns + EXTRA_COLUMN + 6 * header.extra)
+    return HEADER + 7 * header.bodies + header.tracked + by_row + records + n * (n + 1) // 2
 
 
 @kernel(inline=True)
@@ -86,8 +80,7 @@ def has_place(table, state):
 @kernel(inline=True)
 def forget_factor(table, state):
     """Drop the factor that is kept in a state, which must have a place for one."""
-    left = kept_header_at(state, header_at(table, 0).kept)
-    left.factor, left.corrected = NO_FACTOR, 0.0
+    kept_header_at(state, header_at(table, 0).kept).factor = NO_FACTOR
 
 
 @kernel(inline=True)
@@ -116,9 +109,6 @@ def kept_in(table, state):
     factor_jacobian = carve(state, at, (rows, EXTRA_COLUMN + 6 * header.extra))
     at += rows * (EXTRA_COLUMN + 6 * header.extra)
     factor = carve(state, at, (n * (n + 1) // 2,))
-    at += n * (n + 1) // 2
-    steps, forces = carve(state, at, (3, n)), carve(state, at + 3 * n, (2, rows))
-    course = Course(steps[0], steps[1], steps[2], forces[0], forces[1])
     return Kept(
         header.kept,
         poses,
@@ -133,7 +123,6 @@ def kept_in(table, state):
         jacobian,
         factor_jacobian,
         factor,
-        course,
     )
 
 

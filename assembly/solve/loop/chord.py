@@ -5,12 +5,10 @@ With A and W the Jacobian and the weights (1 / mu) of the active rows at the pos
     (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
 
 is a step of the whole system of `augmented_lagrangian.py` with an older matrix (the chord method); the first one is the
-tangent predictor for changed values and targets. Where it is k times the one of the last solve, it is corrected by
-k^2 times the sum of that solve's other steps, which is of second order (`add_correction`), and by how that sum changed
-from one solve to the next. After the first step the matrix is factorized anew, once: for the steps that follow, and for
-the next solve. The iterate that reaches the tolerances is passed to the loop, which judges it as any other. If steps
-gain too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if
-no step had been taken.
+tangent predictor for changed values and targets. If one more step would not reach the tolerances, the matrix is
+factorized anew, once. The iterate that reaches them is passed to the loop, which judges it as any other. If steps gain
+too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no
+step had been taken.
 """
 
 from __future__ import annotations
@@ -40,17 +38,7 @@ from assembly.solve.loop.deadline import is_cut
 from assembly.solve.loop.keep import keep_factor, test_convexity
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import dual_residual
-from assembly.solve.loop.parameters import (
-    ASIDE,
-    CHORD_GAIN,
-    CHORD_LONGEST,
-    CHORD_PENALTY,
-    CHORD_SHIFT,
-    CHORD_STEPS,
-    FARTHER,
-    FEW_STEPS,
-    LIFT_BELOW,
-)
+from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW_STEPS, LIFT_BELOW
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
 from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
@@ -64,7 +52,10 @@ Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_du
 
 @kernel(inner=True)
 def chord_step(shape, kept, point, rows, system):
-    """Compute the step by the kept factor from the Lagrangian's gradient, which `dual_residual` left in `descent`."""
+    """Compute the step by the kept factor from the Lagrangian's gradient, which `dual_residual` left in `descent`.
+
+    Returns the step's largest component.
+    """
     slope, step = system.directions.descent, system.directions.step
     for i in range(step.size):
         step[i] = -slope[i]
@@ -72,96 +63,11 @@ def chord_step(shape, kept, point, rows, system):
         rows.forces[r] = -point.residual[r] * kept.weights[r]
     add_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, step)
     solve_step(system.factor, step.size, shape.sparsity, step)
-
-
-@kernel(inner=True)
-def largest_component(step):
-    """The largest component of a step; one that is not finite is the largest."""
     longest = 0.0
     for i in range(step.size):
         if not abs(step[i]) <= longest:
             longest = abs(step[i])
     return longest
-
-
-@kernel(inner=True)
-def ratio_of(course, step):
-    """How many times the first step of the last solve a first step is; 0 if it leads elsewhere."""
-    along = before = now = 0.0
-    for i in range(step.size):
-        along += step[i] * course.tangent[i]
-        before += course.tangent[i] * course.tangent[i]
-        now += step[i] * step[i]
-    is_along = now * before - along * along <= ASIDE * ASIDE * along * along
-    return along / before if is_along and before > 0.0 and abs(along) <= FARTHER * before else 0.0
-
-
-@kernel(inner=True)
-def foresee(before, trend, ratio):
-    """Write what corrects a step, foreseen from what did before it, into `before`; this, to scale, into `trend`."""
-    for i in range(before.size):
-        scaled = ratio * ratio * before[i] if ratio != 0.0 else 0.0
-        before[i] = scaled + ratio * ratio * trend[i] if ratio != 0.0 else 0.0
-        trend[i] = scaled
-
-
-@kernel(inner=True)
-def note_trend(after, trend, ratio):
-    """Write into `trend` how what corrects a step will change next, from what it was, to scale (`foresee`), and is."""
-    for i in range(after.size):
-        trend[i] = ratio * (after[i] - trend[i]) if ratio != 0.0 else 0.0
-
-
-@kernel(inner=True)
-def add_correction(course, is_known, step):
-    """Add to a tangent step what is foreseen to correct it. Returns the ratio of the step to the last solve's.
-
-    Solutions are smooth functions of what is asked for. What their terms of higher order add to the tangent step goes
-    with the square of its length, and changes from pose to pose as it did before.
-    """
-    ratio = ratio_of(course, step) if is_known else 0.0
-    foresee(course.correction, course.trend, ratio)
-    foresee(course.forces, course.forces_trend, ratio)
-    for i in range(step.size):
-        course.tangent[i] = step[i]
-        step[i] += course.correction[i]
-    return ratio
-
-
-@kernel(inner=True)
-def add_to_course(course, rows, step):
-    """Add a step after the first one, and what multipliers changed by, to what came to the tangent step."""
-    for i in range(step.size):
-        course.correction[i] += step[i]
-    for r in range(rows.count):
-        course.forces[r] += rows.forces[r]
-
-
-@kernel(inner=True)
-def note_course(kept, shape, ratio, rows, system):
-    """At the end of the steps, keep what they tell of the next solve's.
-
-    With D and R what came to the tangent step and to the multipliers, it is the solution of the step's system for
-
-        [ H   A^T ] [ D ]
-        [ A    0  ] [ R ]
-
-    that is kept. Directions that no row and no objective determines, and multipliers of rows that repeat each other,
-    drop out: they would be foreseen, never undone, and grow from solve to solve.
-    """
-    course, off = kept.course, system.directions.step
-    for i in range(off.size):
-        off[i] = CHORD_SHIFT * course.correction[i]
-    for r in range(rows.count):
-        rows.forces[r] = -course.forces[r]
-    add_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, off)
-    solve_step(system.factor, off.size, shape.sparsity, off)
-    for r in range(rows.count):
-        course.forces[r] = -kept.weights[r] * times(shape.bases, kept.factor_jacobian, r, off)
-    for i in range(off.size):
-        course.correction[i] -= off[i]
-    note_trend(course.correction, course.trend, ratio)
-    note_trend(course.forces, course.forces_trend, ratio)
 
 
 @kernel(inner=True)
@@ -194,7 +100,7 @@ def weigh_as_kept(kept, one_sided, rows):
     """
     for r in range(rows.count):
         counts = one_sided[r] == 0 or kept.weights[r] > 0.0
-        rows.active[r] = 1.0 / CHORD_PENALTY if counts else 0.0
+        rows.active[r] = 1.0 / rows.mu if counts else 0.0
         if counts and one_sided[r] == 1 and rows.y[r] > 0.0:
             return False
     return True
@@ -232,14 +138,24 @@ def go_along(task, kept, iterates, rows, system, is_first):
     for k in range(header_at(store.table, 0).contacts):
         if is_near_fold(trial.records, k, LIFT_BELOW):
             return False
-    # Multipliers follow the step that was computed, and have a correction of their own.
-    linear = kept.course.tangent if is_first else step
     for r in range(rows.count):
-        rows.forces[r] = (times(shape.bases, kept.factor_jacobian, r, linear) + current.residual[r]) * kept.weights[r]
-        rows.y[r] += rows.forces[r] + (kept.course.forces[r] if is_first else 0.0)
-    if not is_first:
-        add_to_course(kept.course, rows, step)
+        left = times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]
+        rows.y[r] += left * kept.weights[r]
     return True
+
+
+@kernel(inline=True)
+def wants_factor(task, count, arrived, violation, dual, last):
+    """Whether a factor is to be made at an iterate, in place of an earlier solve's.
+
+    At the end of the steps the new factor is for the next solve; a tick that arrived soon keeps its old one. On the way
+    a factor is made if one more step with the old one would not arrive. Newton's step leaves L e^2 / 2 of a distance e,
+    a chord step with the same matrix leaves L e of the remainder: twice the part that the step before has left.
+    """
+    if arrived:
+        return not (task.tick and count <= FEW_STEPS)
+    rate = 2.0 * max(violation, dual) / last
+    return not (rate * violation <= task.loop.feasible and rate * dual <= task.limits.stationarity)
 
 
 @kernel(inner=True)
@@ -248,7 +164,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
     program, limits, feasible = task.program, task.limits, task.loop.feasible
     shape, stationarity = program.structure, limits.stationarity
     last_violation = last_dual = math.inf
-    swapped, ratio = False, 0.0
+    swapped = False
     failed = Chord(-1, False, math.inf, math.inf, math.inf, math.inf)
     limit = min(CHORD_STEPS, task.loop.longest_tick if task.tick else task.loop.limit)
     tests = not task.tick and header_at(program.store.table, 0).implicit == 0
@@ -264,27 +180,16 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         last = max(last_violation, last_dual)
         if not (arrived or max(violation, dual) <= CHORD_GAIN * last):
             return failed
-        left = kept_header_at(state, kept.header)
-        # The factor that is left for the next solve is made where the first step has led; a tick that arrives soon
-        # leaves the one that it began with.
-        is_wanted = count > 0 and left.factor == EARLIER_FACTOR and not (arrived and task.tick and count <= FEW_STEPS)
-        if is_wanted:
+        is_old = count > 0 and kept_header_at(state, kept.header).factor == EARLIER_FACTOR
+        if is_old and wants_factor(task, count, arrived, violation, dual, last):
             if not keep_factor(program, state, kept, current, rows, system):
                 return failed
             if tests:
                 test_convexity(task, rows, system, dual)
                 take_factor(kept, system.factor)
         if arrived:
-            if count > 0:
-                note_course(kept, shape, ratio, rows, system)
-                left.corrected = 1.0
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
-        if count == limit:
-            return failed
-        chord_step(shape, kept, current, rows, system)
-        if count == 0:
-            ratio = add_correction(kept.course, left.corrected == 1.0, system.directions.step)
-        if not largest_component(system.directions.step) <= CHORD_LONGEST:
+        if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
             return failed
         if not go_along(task, kept, (current, trial), rows, system, count == 0):
             return failed

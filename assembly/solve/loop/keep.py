@@ -18,7 +18,7 @@ from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import curvature_multipliers, weigh_rows
-from assembly.solve.loop.parameters import CHORD_PENALTY, CHORD_SHIFT, LEAST_SHIFT
+from assembly.solve.loop.parameters import CHORD_SHIFT, LEAST_SHIFT
 from assembly.solve.loop.workspace import penalized
 
 
@@ -66,8 +66,7 @@ def leave(program, limits, state, point, rows, system, is_kept, is_solved):
     if not is_solved or kept.factor.shape[0] == 0:
         header.factor = NO_FACTOR
     elif header.factor == NO_FACTOR:
-        header.corrected = 0.0
-        rows = penalized(rows, min(limits.penalty_floor, CHORD_PENALTY))
+        rows = penalized(rows, limits.penalty_floor)
         goal(program, rows.count, point, 1, system.gradient, system.hessian)
         weigh_rows(rows, program.structure.one_sided, point.residual)
         keep_factor(program, state, kept, point, rows, system)

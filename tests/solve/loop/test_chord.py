@@ -16,7 +16,7 @@ import pytest
 import assembly as asm
 from assembly._record import place_of
 from assembly.constraints.program.kept import EARLIER_FACTOR, kept_header_at
-from assembly.constraints.program.records import HEADER_RECORD, TAPE_FIELDS, TAPE_TABLE
+from assembly.constraints.program.records import TAPE_FIELDS, TAPE_TABLE
 from assembly.solve.attempts.attempts import go_on_once
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.parameters import CHORD_SHIFT
@@ -156,96 +156,6 @@ def test_what_is_returned_holds_to_what_it_says(make):
         np.testing.assert_array_equal(again.q, solution.q)
         # Pairs of contacts are found anew from where they are, to rounding.
         assert abs(again.feasibility - solution.feasibility) <= 1e-14 * case.scene.packed().scale
-
-
-def _left_by_first_steps(make, step):
-    """The violations after the first steps of seven solves, each of which changes a value by as much."""
-    case = make()
-    case.change(0.0)
-    solution = case.scene.solve()
-    left = []
-    for k in range(1, 8):
-        case.change(step * k)
-        solution = case.scene.solve(solution)
-        assert solution.success and _by_chords(solution)
-        left.append(solution.history[1, 1])
-    return np.array(left)
-
-
-@pytest.mark.parametrize("make", [four_bar, wires, limited_arm])
-def test_first_steps_are_corrected_as_the_last_ones_were(make):
-    # A tangent leaves what goes with the square of a step; corrected as that of the last solve, with its cube; by how
-    # that changed as well, with its fourth power. The powers that come next shift these a little.
-    coarse, fine = (_left_by_first_steps(make, step * make().small) for step in (2.0, 1.0))
-    powers = np.log2(coarse / fine)
-    assert powers[0] == pytest.approx(2.0, abs=0.05)
-    assert powers[1] > 2.7
-    assert powers[-1] > 3.5
-    assert fine[1] < 0.2 * fine[0]
-    assert fine[-1] < 1e-2 * fine[0]
-
-
-def test_steps_to_and_fro_are_corrected():
-    case = four_bar()
-    case.change(0.0)
-    solution = case.scene.solve()
-    left = []
-    for k in range(1, 13):
-        case.change(case.small * (k % 2))
-        solution = case.scene.solve(solution)
-        left.append(solution.history[1, 1])
-    # At first as far as the cube of the step, which comes with the other sign on the way back; then this, too.
-    assert max(left[-2:]) < 1e-3 * left[0]
-
-
-def _without_course(solution, scene):
-    """The same solution without what is kept of its steps."""
-    other = deepcopy(solution)
-    other._ended, other._scene = Ended(solution._packed, solution._state.copy()), scene
-    kept_header_at(other._state, other._packed.kept_at).corrected = 0.0
-    return other
-
-
-def test_what_nothing_determines_is_not_foreseen_again():
-    # A ball turns freely about its joint. A turn that came to one solve does not go on with the next ones.
-    ground, slide, ball = asm.Body("ground", fixed=True), asm.Body("slide"), asm.Body("ball")
-    scene = asm.Assembly([ground, slide, ball])
-    scene.constrain(asm.Prismatic(ground.frame(), slide.frame(), "guide"), asm.Spherical(slide, ball, "socket"))
-    grip = asm.PointDistance(slide.point(0.3, 0.0, 0.0), (0.3, 0.1, 0.0))
-    scene.minimize(grip)
-    solution = scene.solve(scene.solve())
-    turned = []
-    for k in range(1, 9):
-        grip.target = (0.3, 0.1, 0.05 * k)
-        after = scene.solve(solution)
-        assert after.success and _by_chords(after)
-        turned.append(abs(after.pose(ball).quaternion - solution.pose(ball).quaternion).max())
-        solution = after
-        if k == 3:
-            # At the end of a state: three lists of 12 unknowns, the second of which is the correction, and two of rows.
-            rows = solution._packed.rows_table[place_of(HEADER_RECORD, "rows")]
-            steps = solution._state[-(36 + 2 * rows) :][:36].reshape(3, 12)
-            steps[1, 9:] += 1e-3
-    assert max(turned[:3]) < 1e-12
-    # Once, and once more as what is missing from it: both by half of 1e-3, as quaternions have it.
-    assert turned[3:5] == pytest.approx([5e-4, 5e-4], rel=1e-6)
-    assert max(turned[5:]) < 1e-15
-
-
-def test_a_first_step_that_leads_elsewhere_is_not_corrected():
-    case = wires()
-    solution = case.scene.solve()
-    for k in range(1, 4):
-        case.change(case.small * k)
-        solution = case.scene.solve(solution)
-    plain = _without_course(solution, case.scene)
-    case.change(case.small * 4)
-    left, left_plain = (case.scene.solve(before).history[1, 1] for before in (solution, plain))
-    assert left < 0.1 * left_plain
-    ((_, grip),) = case.scene.objectives
-    grip.target = grip.target + (0.5, 0.3, -0.5)
-    aside, aside_plain = (case.scene.solve(before).history for before in (solution, plain))
-    np.testing.assert_array_equal(aside, aside_plain)
 
 
 def test_a_row_that_begins_to_count_is_left_to_the_loop():
