@@ -46,17 +46,14 @@ def is_vertex_contact(posed, codes):
 
 
 @kernel(inner=True)
-def hold_extrema(posed, least, extrema):
-    """Turn extrema that are at a corner into vertex contacts: a row that jumps between corners holds none of them.
-
-    Those that are deeper than `least` find the way out themselves.
-    """
+def hold_extrema(posed, extrema):
+    """Turn extrema that are at a corner into vertex contacts: a row that jumps between corners holds none of them."""
     if is_list_full(extrema):
         return
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
         codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-        if extremum.corner > 0.0 or extremum.gap < least or not is_vertex_contact(posed, codes):
+        if extremum.corner > 0.0 or extremum.gap < -SLACK or not is_vertex_contact(posed, codes):
             continue
         x, n = pair_parameters(extremum), three_of(extremum.normal)
         found = solids_extremum(posed, codes, x, n, extrema, FEATURES)
@@ -132,4 +129,4 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
         if bends and not is_list_full(extrema) and is_next(posed, codes, side, t, extrema, extrema.count[0]):
             add_vertex_contact(posed, codes, start, span, merge_radius, extrema, POINT)
     if 0 <= found <= candidates.shape[0]:
-        hold_extrema(posed, span[0], extrema)
+        hold_extrema(posed, extrema)
