@@ -28,7 +28,7 @@ from assembly.constraints.program.records import (
 from assembly.constraints.program.tapes import tape_rows
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def coordinate_row(asked, k, factor, start, point, r, column):
     """Return `factor` times a coordinate of record k, write its gradient to row r from `column`, track its angle."""
     angle = asked.angle
@@ -40,7 +40,7 @@ def coordinate_row(asked, k, factor, start, point, r, column):
     return factor * found.value
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def joint_row(store, r, start, point):
     """Row r, of a joint."""
     header = header_at(store.table, 0)

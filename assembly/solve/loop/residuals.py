@@ -206,7 +206,7 @@ def shape_of(table, most, n, blocks, integers, doubles):
     return Structure(bases, of_rows[0], sparsity, (of_rows[1], of_rows[2]))
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def times(bases, jacobian, r, d):
     """Row r of J d."""
     row = jacobian_row_at(jacobian, r)
@@ -231,7 +231,7 @@ def times(bases, jacobian, r, d):
     return s
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def add_row(bases, jacobian, r, factor, out):
     """out += factor times row r of J."""
     row = jacobian_row_at(jacobian, r)
