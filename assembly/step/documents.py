@@ -110,10 +110,16 @@ def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -
 
 def _entries_of(files: dict[str, Path], reader: Any) -> dict[str, Path]:
     """The files of which a reader has made shapes, by the entries of the labels of these, from those by their names."""
-    o = occt()
-    found = {}
+    if not files:
+        return {}
+    o, found = occt(), {}
+    try:
+        known = reader.ExternFiles()
+    except TypeError:
+        # Wheels of OCCT 7 have no type for this list: shapes of other files then are those that OCCT has repaired.
+        return {}
     for name, file in files.items():
-        key, known = o.TCollection_AsciiString(name), reader.ExternFiles()
+        key = o.TCollection_AsciiString(name)
         label = known.Find(key).GetLabel() if known.IsBound(key) else None
         if label is not None and not label.IsNull() and parts(o.XCAFDoc_ShapeTool.GetShape_s(label), o.TopAbs_FACE):
             found[entry_of(label)] = file

@@ -232,6 +232,7 @@ def test_an_edge_that_ends_a_millionth_from_a_pole_is_projected(tmp_path):
 @pytest.mark.parametrize("seed", [0, 24, 26, 51])
 def test_parts_of_other_files_are_read_as_these_are_alone(seed, tmp_path):
     """OCCT repairs what other files have, and these four shapes it then has wrong or cannot be read."""
+    pytest.importorskip("OCP.collections", reason="wheels of OCCT 7 do not say which shapes are of which file")
     wanted = measured(shape := by_random(seed))
     file = File()
     top, part = file.group("top"), file.part(shape, "part")
