@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,13 @@ from assembly._garbage import uncollected
 from assembly.errors import AssemblyError
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
-from assembly.step.documents import StepError, document_of
+from assembly.step.documents import Document, StepError, document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_faces
 from assembly.step.images import image_of, placement_of
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
-from assembly.step.tree import Color, Part, free_labels, leaves
+from assembly.step.tree import Color, Leaf, Part, entry_of, free_labels, leaves
 
 __all__ = ["Source", "Unrepaired", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
 
@@ -52,7 +52,7 @@ class Source:
     `absent` has the names of missing files that it refers to. The document of a damaged file holds its undamaged
     entities. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
     numbers of faces that were read. Of a document without `repairs`, one face that cannot be read is enough to give up.
-    `is_repaired` says that OCCT has repaired faces all the same, which turns some inside out.
+    `others` are the documents that have the parts of labels, by the entries of these, all without repairs.
     """
 
     file: Path
@@ -63,15 +63,15 @@ class Source:
     names: tuple[str | None, ...] = ()
     advance: Callable[[int], object] = bool
     repairs: bool = True
-    is_repaired: bool = True
+    others: Mapping[str, Document] = field(default_factory=dict)
 
 
 def solids_of(path: str) -> Iterator[Any]:
     """OCCT's shapes of the bodies that `read_step` makes, in their order."""
-    document = document_of(path).made
-    root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    document = document_of(path)
+    root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.made.Main())
     for label in free_labels(root):
-        for leaf in leaves(label, occt().TopLoc_Location(), None, None):
+        for leaf in leaves(label, occt().TopLoc_Location(), None, None, document.others):
             yield from solids_in(Part(leaf.label).shape)
 
 
@@ -165,6 +165,33 @@ def unique(name: str, taken: set[str]) -> str:
     return candidate
 
 
+def _part_read(leaf: Leaf, factor: float, scale: float, repairs: bool) -> list[Shape]:
+    """What is read of a part, of a file without repairs with these where they are needed.
+
+    Raises
+    ------
+    Unrepaired
+        They are, and the part is not in a document of its own.
+    """
+    made = _shapes_of(leaf.label, factor, scale, repairs and leaf.home is None)
+    # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
+    if not any(shape.missing or shape.slits for shape in made) or repairs and leaf.home is None:
+        return made
+    if leaf.home is None:
+        raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
+    o, again = occt(), document_of(leaf.home.path)
+    label = o.TDF_Label()
+    o.TDF_Tool.Label_s(again.made.GetData(), entry_of(leaf.label), label, False)
+    return made if label.IsNull() else _shapes_of(label, factor, scale, is_repaired=True)
+
+
+def _shapes_of(label: Any, factor: float, scale: float, is_repaired: bool) -> list[Shape]:
+    """The solids and sheets of the part of a label, scaled about its origin."""
+    original = Part(label)
+    images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
+    return [_outward(shape, read_shape(shape, told, original.color, scale), is_repaired) for shape, told in images]
+
+
 def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], list[str]]:
     """The bodies of a document, and what there is to warn of; lengths are millimeters times `scale`."""
     file, count = source.file, source.count
@@ -177,31 +204,21 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
         slits: list[str] = []
         built = 0
         taken: set[str] = set()
-        read: dict[tuple[str, float], list[Shape]] = {}
+        read: dict[tuple[str, str, float], list[Shape]] = {}
         said = iter(source.names)
         for label in free_labels(root):
-            for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
-                entry = o.TCollection_AsciiString()
-                o.TDF_Tool.Entry_s(leaf.label, entry)
+            for leaf in leaves(label, o.TopLoc_Location(), file.stem, None, source.others):
                 try:
                     pose, factor = placement_of(leaf.location, scale)
                 except Unreadable as reason:
                     missing.append(f"{leaf.name!r}: {reason}")
                     continue
                 # A scaled or mirrored image is read as another part, but the file's number of faces has it only once.
-                key = entry.ToCString(), factor
+                key = leaf.home.path if leaf.home else "", entry_of(leaf.label), factor
                 if key not in read:
-                    original = Part(leaf.label)
-                    images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
-                    read[key] = [
-                        _outward(shape, read_shape(shape, told, original.color, scale), source.is_repaired)
-                        for shape, told in images
-                    ]
-                    # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
-                    if not source.repairs and any(shape.missing or shape.slits for shape in read[key]):
-                        raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
+                    read[key] = _part_read(leaf, factor, scale, source.repairs)
                     faces = sum(len(shape.faces) + len(shape.missing) + len(shape.slits) for shape in read[key])
-                    if sum(part == key[0] for part, _ in read) == 1:
+                    if sum(other[:2] == key[:2] for other in read) == 1:
                         source.advance(faces)
                         built += faces
                     for shape in read[key]:

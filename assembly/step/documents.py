@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 from assembly._file_names import read_elsewhere
 from assembly.errors import InputError
-from assembly.step.occt import occt, settings
+from assembly.step.occt import occt, parts, settings
 from assembly.step.references import references_of
 from assembly.step.syntax import first_fault, is_step, mended
+from assembly.step.tree import entry_of
 
 __all__ = ["UNITS", "Damaged", "Malformed", "StepError", "StepWarning", "checked_unit", "document_of"]
 
@@ -60,24 +61,28 @@ class Document(NamedTuple):
     made
         TDocStd_Document.
     faces : int
-        How many it has.
+        How many it and the others have.
     missing : list of str
         Files that it needs and that are not there.
-    is_repaired : bool
-        Whether OCCT has repaired faces of it: those of other files always.
+    path : str
+        Of the file.
+    others : dict
+        Files that it refers to, read by themselves without repairs, by the entries of the labels that stand for them.
     """
 
     made: Any
     faces: int
     missing: list[str]
-    is_repaired: bool
+    path: str
+    others: dict[str, Document]
 
 
 def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> Document:
     """A file as a document of OCCT.
 
     OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
-    repairs it does not: faces are checked when they are made of them.
+    repairs it does not: faces are checked when they are made of them. It repairs all that other files have, whatever it
+    is told, so those that refer to no others are read by themselves as well.
 
     OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
     end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
@@ -94,8 +99,31 @@ def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -
     for other in others.files:
         _whole(str(other), other.read_bytes(), folder, other.relative_to(file.parent))
     del text
-    made, count = _loaded(path, str(file) if folder is None else whole, folder is not None, repairs)
-    return Document(made, count, others.missing, repairs or bool(others.files))
+    made, count, reader = _loaded(path, str(file) if folder is None else whole, folder is not None, repairs)
+    alone: dict[str, Document] = {}
+    # What is left of a damaged file is read with all repairs anyway.
+    for entry, other in (_entries_of(others.last, reader) if folder is None else {}).items():
+        alone[entry] = document_of(str(other), repairs=False)
+        count += alone[entry].faces
+    return Document(made, count, others.missing, path, alone)
+
+
+def _entries_of(files: dict[str, Path], reader: Any) -> dict[str, Path]:
+    """The files of which a reader has made shapes, by the entries of the labels of these, from those by their names."""
+    if not files:
+        return {}
+    o, found = occt(), {}
+    try:
+        known = reader.ExternFiles()
+    except TypeError:
+        # Wheels of OCCT 7 have no type for this list: shapes of other files then are those that OCCT has repaired.
+        return {}
+    for name, file in files.items():
+        key = o.TCollection_AsciiString(name)
+        label = known.Find(key).GetLabel() if known.IsBound(key) else None
+        if label is not None and not label.IsNull() and parts(o.XCAFDoc_ShapeTool.GetShape_s(label), o.TopAbs_FACE):
+            found[entry_of(label)] = file
+    return found
 
 
 def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
@@ -113,8 +141,8 @@ def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.
     return str(file)
 
 
-def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, int]:
-    """The document and number of faces of a file with the syntax of one: that at the path, or what is whole of it."""
+def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, int, Any]:
+    """The document of a file with the syntax of one, that at the path or what is whole of it, its faces, its reader."""
     o = occt()
     # OCCT has its settings only after a reader was made.
     reader = o.STEPCAFControl_Reader()
@@ -149,7 +177,7 @@ def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, in
                 raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
     finally:
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
-    return document, faces
+    return document, faces, reader
 
 
 def _counted(reader: Any) -> tuple[int, int, int]:

@@ -119,7 +119,7 @@ def what_lacks() -> str:
 def quiet() -> Iterator[None]:
     """Keep OCCT from printing its statistics."""
     printers = occt().Message.DefaultMessenger_s().ChangePrinters()
-    kept = [printers.Value(k) for k in range(1, printers.Length() + 1)]
+    kept = [printers.Value(k) for k in range(1, printers.Upper() + 1)]
     printers.Clear()
     try:
         yield

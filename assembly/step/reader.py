@@ -183,10 +183,20 @@ def bodies_of(
     damaged = folder is not None
 
     def read(repairs: bool) -> tuple[list[Body], list[str]]:
-        document, count, absent, is_repaired = document_of(path, folder, repairs=repairs)
+        document = document_of(path, folder, repairs=repairs)
         loaded()
-        with watched(progress, "reading", count, "face") as advance:
-            found = Source(Path(path), document, count, tuple(absent), damaged, (), advance, repairs, is_repaired)
+        with watched(progress, "reading", document.faces, "face") as advance:
+            found = Source(
+                Path(path),
+                document.made,
+                document.faces,
+                tuple(document.missing),
+                damaged,
+                (),
+                advance,
+                repairs,
+                document.others,
+            )
             return bodies_in(found, 1.0 / checked_unit(unit), strict)
 
     with quiet(), uncollected():

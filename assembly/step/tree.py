@@ -2,39 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from assembly.step.occt import occt
 
-__all__ = ["Color", "Leaf", "Part", "color_of", "free_labels", "leaves", "name_of"]
+__all__ = ["Color", "Leaf", "Part", "color_of", "entry_of", "free_labels", "leaves", "name_of"]
 
 Color = tuple[float, float, float]
 # What writers put where there is no name.
 _NO_NAMES = {"", "NONE", "''"}
+_NO_OTHERS: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A part where it stands: its label, the location accumulated down to it, its name, the color given on the way."""
+    """A part where it stands: its label, the location accumulated down to it, its name, the color given on the way.
+
+    `home` is the document that the label is in, if that is another one.
+    """
 
     label: Any
     location: Any
     name: str | None
     color: Color | None
+    home: Any = None
 
 
 def listed(fill: Any, *arguments: Any) -> list[Any]:
     """Labels that a method writes into its last argument."""
     found = occt().Labels()
     fill(*arguments, found)
-    return [found.Value(k) for k in range(1, found.Length() + 1)]
+    # Its length, which it inherits, takes a hundred times as long as its own last place.
+    return [found.Value(k) for k in range(1, found.Upper() + 1)]
 
 
 def free_labels(shapes: Any) -> list[Any]:
     """Labels of the shapes that no assembly refers to."""
     return listed(shapes.GetFreeShapes)
+
+
+def entry_of(label: Any) -> str:
+    """The place of a label in its document, in OCCT's notation."""
+    o = occt()
+    entry = o.TCollection_AsciiString()
+    o.TDF_Tool.Entry_s(label, entry)
+    return str(entry.ToCString())
 
 
 def name_of(label: Any) -> str | None:
@@ -62,7 +76,9 @@ def color_of(label: Any) -> Color | None:
     return None
 
 
-def leaves(label: Any, location: Any, name: str | None, color: Color | None) -> Iterator[Leaf]:
+def leaves(
+    label: Any, location: Any, name: str | None, color: Color | None, others: Mapping[str, Any] = _NO_OTHERS
+) -> Iterator[Leaf]:
     """All parts under a label, in the order of the file.
 
     Parameters
@@ -71,18 +87,25 @@ def leaves(label: Any, location: Any, name: str | None, color: Color | None) -> 
         Where to begin.
     name, color
         Of what is above; the name is a part's that has none, and the color nearest to the root counts.
+    others
+        Documents that have the parts of labels, by the entries of these.
     """
     o = occt()
     tool = o.XCAFDoc_ShapeTool
     if tool.IsReference_s(label):
         part = o.TDF_Label()
         tool.GetReferredShape_s(label, part)
-        yield from leaves(part, location.Multiplied(tool.GetLocation_s(label)), name, color or color_of(label))
+        yield from leaves(part, location.Multiplied(tool.GetLocation_s(label)), name, color or color_of(label), others)
+    elif others and (home := others.get(entry_of(label))) is not None:
+        root = o.XCAFDoc_DocumentTool.ShapeTool_s(home.made.Main())
+        there = [leaf for one in free_labels(root) for leaf in leaves(one, location, name, color)]
+        for leaf in there:
+            # The one part of a file has the name that the file which refers to it has for it.
+            own = name_of(label) if len(there) == 1 else None
+            yield replace(leaf, name=own or leaf.name, home=home)
     elif tool.IsAssembly_s(label):
-        components = o.Labels()
-        tool.GetComponents_s(label, components, False)
-        for k in range(1, components.Length() + 1):
-            yield from leaves(components.Value(k), location, name_of(label) or name, color)
+        for component in listed(tool.GetComponents_s, label):
+            yield from leaves(component, location, name_of(label) or name, color, others)
     else:
         yield Leaf(label, location, name_of(label) or name, color)
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import assembly as asm
 from assembly.step import StepError, StepWarning
+from assembly.step.documents import _entries_of
 from assembly.step.solids import sewn
 from tests.geometry.loops import circle, polygon
 from tests.step.models import O
@@ -192,6 +194,13 @@ def test_missing_references_are_told(tmp_path):
     assert len(body.faces) == 6
     shutil.copy(tmp_path / "main.step", tmp_path / "gone.stp")
     assert len(asm.read_step(tmp_path / "main.step")) == 1
+
+
+def test_shapes_of_other_files_are_occt_s_where_it_does_not_say_which_they_are(tmp_path):
+    def unknown():
+        raise TypeError("Unable to convert function return value to a Python type")
+
+    assert _entries_of({"a.stp": tmp_path / "a.stp"}, SimpleNamespace(ExternFiles=unknown)) == {}
 
 
 @pytest.mark.parametrize(("name", "says"), [("a.json", "Assembly.save"), ("a.HTML", "save_html"), ("a.stl", "STL")])

@@ -13,9 +13,11 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.step.carriers import reals_of
+from assembly.step.documents import StepError
 from assembly.step.edges import Edges
 from assembly.step.occt import parts, quiet
 from tests.step.models import O, point
+from tests.step.test_read import File
 
 # How far volumes and areas may be off, and centers, over the size: OCCT finds them by sums of its own.
 CLOSE, NEAR = 1e-5, 1e-3
@@ -225,6 +227,39 @@ def test_an_edge_that_ends_a_millionth_from_a_pole_is_projected(tmp_path):
     (body,) = asm.read_step(written(shape, tmp_path / "given.step"))
     assert abs(body.volume / volume - 1.0) < 1e-9
     assert abs(body.area / area - 1.0) < 1e-9
+
+
+@pytest.mark.parametrize("seed", [0, 24, 26, 51])
+def test_parts_of_other_files_are_read_as_these_are_alone(seed, tmp_path):
+    """OCCT repairs what other files have, and these four shapes it then has wrong or cannot be read."""
+    pytest.importorskip("OCP.collections", reason="wheels of OCCT 7 do not say which shapes are of which file")
+    wanted = measured(shape := by_random(seed))
+    file = File()
+    top, part = file.group("top"), file.part(shape, "part")
+    for at in (0.0, 10.0):
+        file.put(top, part, asm.Pose((at, 0.0, 0.0)))
+    file.shapes.UpdateAssemblies()
+    with quiet():
+        writer = O.STEPCAFControl_Writer()
+        assert writer.Transfer(file.document, O.STEPControl_AsIs, "one_")
+        writer.Write(str(tmp_path / "top.step"))
+    (alone,) = tmp_path.glob("one_*.stp")
+    once, again = asm.read_step(tmp_path / "top.step")
+    assert once.faces[0].face is again.faces[0].face and agrees([once], wanted)
+    assert once.name == "part" and again.pose.position[0] - once.pose.position[0] == pytest.approx(10.0)
+    (same,) = asm.read_step(alone)
+    assert [side.name for side in once.faces] == [side.name for side in same.faces]
+    for mine, other in zip(once.faces, same.faces, strict=True):
+        assert np.array_equal(mine.face.surface.control_points, other.face.surface.control_points)
+        assert mine.face.area() == other.face.area()
+
+
+def test_an_edge_that_turns_back_on_itself_is_told(tmp_path):
+    """OCCT's own, in the file that it writes of this shape."""
+    with pytest.raises(
+        StepError, match="not read: .*'face 1': outer crosses or touches itself .*'face 4': outer crosses"
+    ):
+        asm.read_step(written(by_random(283), tmp_path / "given.step"))
 
 
 @pytest.mark.parametrize("seed", [61, 138])
