@@ -29,7 +29,8 @@ EXACT = 1e-7
 class Shape:
     """Faces of one solid, or of one sheet, in the part's own coordinates.
 
-    `is_doubtful` says that OCCT has another part of the surface for one of them.
+    `is_doubtful` says that OCCT has another part of the surface for one of them, `is_against` that the outer wire of
+    one has the material on its right.
     """
 
     faces: list[Face]
@@ -39,6 +40,7 @@ class Shape:
     inexact: list[str]
     slits: list[str] = field(default_factory=list)
     is_doubtful: bool = False
+    is_against: bool = False
 
 
 class Unrepaired(AssemblyError):
@@ -121,6 +123,7 @@ def read_shape(
             continue
         if one.deviation > EXACT:
             made.inexact.append(f"{label!r} to {one.deviation:.1g} mm")
+        made.is_against |= one.is_against
         one.face.color = tint
         made.faces.append(one.face)
     return made
@@ -198,7 +201,10 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                         for shape, told in images
                     ]
                     # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
-                    if not source.repairs and any(shape.missing or shape.slits for shape in read[key]):
+                    # Of a wire that runs the wrong way OCCT turns the face instead, unless it has repaired it before.
+                    if not source.repairs and any(
+                        shape.missing or shape.slits or shape.is_against for shape in read[key]
+                    ):
                         raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
                     faces = sum(len(shape.faces) + len(shape.missing) + len(shape.slits) for shape in read[key])
                     if sum(part == key[0] for part, _ in read) == 1:
