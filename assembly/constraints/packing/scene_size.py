@@ -167,7 +167,7 @@ def _box(points: Sequence[Array]) -> float:
 
 def reach_of(bodies: Sequence[Body], marks: Iterable[Sequence[ArrayLike]]) -> float:
     """The largest coordinate of a mark on its body, or of a body seen from the first one."""
-    on_bodies = max((float(np.abs(places).max()) for places in marks if len(places)), default=0.0)
+    on_bodies = max((float(np.abs(np.asarray(places)).max()) for places in marks if len(places)), default=0.0)
     positions = np.array([body.pose.position for body in bodies])
     return max(on_bodies, float(np.abs(positions - positions[0]).max()))
 
