@@ -9,7 +9,7 @@ from typing import Any
 from assembly.cad.libraries import is_of, shown
 from assembly.cad.locations import location_of, pose_of
 from assembly.cad.shapes import Bodies, Label, color_of
-from assembly.errors import items, text
+from assembly.errors import InputError, items, text
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.bodies import unique
@@ -46,6 +46,7 @@ def built(thing: Any) -> Any:
 
 def _below(part: Any, name: str, around: Any, color: Color | None, taken: set[str]) -> Iterator[Leaf]:
     color = color_of(part.color) or color
+    _check_shape(part, name)
     if not part.children:
         yield Leaf(part, name, around, color)
         return
@@ -54,6 +55,14 @@ def _below(part: Any, name: str, around: Any, color: Color | None, taken: set[st
     for child in part.children:
         label = unique(child.label or "part", names)
         yield from _below(child, f"{name}/{label}" if name else label, location, color, taken)
+
+
+def _check_shape(part: Any, name: str) -> None:
+    """Raise where build123d has made nothing of a part: it asserts that there is something, with nothing to say."""
+    try:
+        _ = part.wrapped
+    except AssertionError:
+        raise InputError(f"{name} is an empty {type(part).__name__}; expected {EXPECTED}") from None
 
 
 def leaves_of(thing: Any, name: str = "part") -> list[Leaf]:
@@ -69,6 +78,7 @@ def leaves_of(thing: Any, name: str = "part") -> list[Leaf]:
     if is_of("build123d", "Shape", thing):
         if thing.children:
             return list(_below(thing, "", root, None, set()))
+        _check_shape(thing, "thing")
         return [Leaf(thing, text("name", thing.label or name), root, color_of(thing.color))]
     if isinstance(thing, (str, bytes)) or not isinstance(thing, Iterable):
         raise TypeError(f"thing is {shown(thing)}; expected {EXPECTED}")

@@ -29,7 +29,8 @@ EXACT = 1e-7
 class Shape:
     """Faces of one solid, or of one sheet, in the part's own coordinates.
 
-    `is_doubtful` says that OCCT has another part of the surface for one of them.
+    `is_doubtful` says that OCCT has another part of the surface for one of them, `is_against` that the outer wire of
+    one has the material on its right.
     """
 
     faces: list[Face]
@@ -39,6 +40,7 @@ class Shape:
     inexact: list[str]
     slits: list[str] = field(default_factory=list)
     is_doubtful: bool = False
+    is_against: bool = False
 
 
 class Unrepaired(AssemblyError):
@@ -121,6 +123,7 @@ def read_shape(
             continue
         if one.deviation > EXACT:
             made.inexact.append(f"{label!r} to {one.deviation:.1g} mm")
+        made.is_against |= one.is_against
         one.face.color = tint
         made.faces.append(one.face)
     return made
@@ -174,8 +177,10 @@ def _part_read(leaf: Leaf, factor: float, scale: float, repairs: bool) -> list[S
         They are, and the part is not in a document of its own.
     """
     made = _shapes_of(leaf.label, factor, scale, repairs and leaf.home is None)
-    # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
-    if not any(shape.missing or shape.slits for shape in made) or repairs and leaf.home is None:
+    # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it. Of a wire that
+    # runs the wrong way OCCT turns the face instead, unless it has repaired it before.
+    needs_repairs = any(shape.missing or shape.slits or shape.is_against for shape in made)
+    if not needs_repairs or repairs and leaf.home is None:
         return made
     if leaf.home is None:
         raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")

@@ -13,6 +13,7 @@ from assembly.errors import InputError
 from assembly.geometry.faces.boundary import OVERSHOOT
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_packing import signed_area
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.chains import chained, head_to_tail
 from assembly.step.edges import Edges, Laid
@@ -25,15 +26,21 @@ from assembly.step.wires import outermost
 __all__ = ["Read", "read_face", "read_faces"]
 
 Array = NDArray[np.float64]
+# A loop whose end is so near to its start, over its extent, does not go round.
+CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
 class Read:
-    """A face, and what was not exact about it [mm]: of its surface, and of the ends of its edges."""
+    """A face, and what was not exact about it [mm]: of its surface, and of the ends of its edges.
+
+    `is_against` says that its outer wire has the material on its right.
+    """
 
     face: Face
     deviation: float
     gap: float
+    is_against: bool
 
 
 @dataclass(eq=False)
@@ -124,7 +131,18 @@ class _Draft:
         if outer is None and not holes:
             # The edge of a surface that is damaged may bound no face, which is otherwise found when it is asked for.
             _ = made.boundary
-        self.read = Read(made, self.deviation, self.gap)
+        self.read = Read(made, self.deviation, self.gap, outer is not None and _is_clockwise(outer))
+
+
+def _is_clockwise(loop: list[NurbsCurve]) -> bool:
+    """Whether a loop that closes in (u, v) runs clockwise; one that goes round does not."""
+    points = np.concatenate([curve.control_points for curve in loop])
+    points -= points[0]
+    if np.abs(points[-1]).max() > CLOSED * np.abs(points).max():
+        return False
+    polygon = points[:-1, 0] @ points[1:, 1] - points[:-1, 1] @ points[1:, 0]
+    # Control polygons of wild curves may say what is not so.
+    return bool(polygon < 0.0) and signed_area(loop) < 0.0
 
 
 def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:

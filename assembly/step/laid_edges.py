@@ -25,14 +25,21 @@ from assembly.step.crossings import crossings
 from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated
 
-__all__ = ["EdgeCurves", "Laid"]
+__all__ = ["EdgeCurves", "Laid", "nearness"]
 
 Array = NDArray[np.float64]
 # Deviation of edges that are interpolated, over the size of the surface.
 FOLLOWED = 1e-10
+# What points are off by where coordinates are large, over these: some twenty roundings.
+_ROUNDED = 5e-15
 # Most steps to the place at which a curve has gone some way, and the parts of its whole way at which they end, and that
 # may be left.
 _STEPS, _LAST, _LEFT = 20, 1e-15, 1e-12
+
+
+def nearness(length: float, surface: NurbsSurface) -> float:
+    """How near curves on a surface are followed: to a length, and what its coordinates are rounded by."""
+    return length + _ROUNDED * float(np.abs(surface.control_points).max())
 
 
 class Laid(NamedTuple):
@@ -122,6 +129,11 @@ class EdgeCurves:
         return self.surface.evaluate(uv[:, 0], uv[:, 1])
 
     @cached_property
+    def nearness(self) -> float:
+        """How near edges are followed in space."""
+        return nearness(FOLLOWED * self.surface.size, self.surface)
+
+    @cached_property
     def is_affine(self) -> bool:
         """Whether points of a plane are linear in our parameters."""
         surface = self.surface
@@ -165,7 +177,7 @@ class EdgeCurves:
             return self._in_plane(curve, self.carrier.plane)
         low, high = curve.domain
         joints = self._joints(curve)
-        space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, FOLLOWED * self.surface.size)
+        space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, self.nearness)
         points, weights = space.cartesian
         if self.carrier.is_own:
             flat = spline_curve(curve.control_points, curve.weights, curve.knots, curve.degree)
@@ -189,7 +201,7 @@ class EdgeCurves:
         o = occt()
         points, weights = space.cartesian
         pieces = NurbsCurve(points, space.knots, space.degree, weights).bezier_pieces()
-        form = curve_form([pieces], FOLLOWED * self.surface.size)
+        form = curve_form([pieces], self.nearness)
         start = self.at(curve.evaluate(joints[:1]))[0]
         if isinstance(form, Line):
             way = self.at(curve.evaluate(joints[-1:]))[0] - start
@@ -241,7 +253,7 @@ class EdgeCurves:
             points, weights = self.extended(curve.control_points), curve.weights
             knots, degree = curve.knots, curve.degree
         else:
-            space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, FOLLOWED * self.surface.size)
+            space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, self.nearness)
             (points, weights), knots, degree = space.cartesian, space.knots, space.degree
         inside = (points - origin) @ axes.T
         whole = NurbsCurve(np.column_stack([inside, np.zeros(len(inside))]), knots, degree, weights)

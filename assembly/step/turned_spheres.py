@@ -22,6 +22,7 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.crossings import crossings
+from assembly.step.laid_edges import nearness
 from assembly.step.occt import occt
 from assembly.step.profiles import approximated
 from assembly.step.surfaces import patch
@@ -134,7 +135,7 @@ class _Turned:
         joints = np.unique(np.clip(np.concatenate(cuts), low, high))
         joints = np.append(joints[:-1][np.diff(joints) > _SAME * (high - low)], high)
         joints[0] = low
-        made, _ = approximated(mapped, joints, _FOLLOWED * self.form.radius)
+        made, _ = approximated(mapped, joints, nearness(_FOLLOWED * self.form.radius, self.given))
         points, _ = made.cartesian
         return NurbsCurve(points, made.knots, made.degree, name=curve.name)
 

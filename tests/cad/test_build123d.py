@@ -257,6 +257,8 @@ def test_a_builder_and_a_single_part():
         asm.cad.from_build123d(3)
     with pytest.raises(asm.errors.InputError, match="the label of a face"):
         asm.cad.from_build123d(builder, faces=[builder.part.faces()[0]])
+    with pytest.raises(asm.errors.InputError, match="thing is an empty Compound"):
+        asm.cad.from_build123d(bd.Compound(children=[]))
     for thing in (3, builder.part.faces()[0]):
         with pytest.raises(TypeError, match="expected a cadquery.Assembly, or build123d parts"):
             asm.cad.solve(thing)

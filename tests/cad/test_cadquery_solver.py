@@ -195,6 +195,15 @@ def test_constraints_that_are_added_count():
     assert len(solved(assembly)._scene.constraints) == 1
 
 
+def test_centers_that_are_off_by_rounding_are_no_size_of_the_scene():
+    """OCCT finds centers of round faces to 1e-16; where nothing else is a length, that is none."""
+    block, pin = box(4, 4, 2).faces(">Z").hole(1), cq.Workplane().cylinder(6, 0.5)
+    assembly = cq.Assembly(block, name="block").add(pin, name="pin", loc=cq.Location((9, 9, 9), (1, 0, 0), 30))
+    for kind in ("Axis", "Point"):
+        assembly.constrain("block@faces@%CYLINDER", "pin@faces@%CYLINDER", kind)
+    solved(assembly)
+
+
 def test_every_part_held_by_the_world():
     """Their solver keeps the first part, which then does not hold; here all move."""
     assembly = cq.Assembly().add(box(1, 1, 1), name="a").add(box(1, 1, 1), name="b")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import assembly as asm
 from assembly.step.wires import bounds, outermost, wires_of
-from tests.step.models import MODELS, O, box, cylinder, drill, faces, without
+from tests.step.models import MODELS, O, box, cylinder, drill, edges, faces, filleted, joined, volumes, without
+from tests.step.test_poles import written
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -36,3 +39,19 @@ def test_the_wire_around_others_is_found_among_them():
             found = turned[outermost(turned, surface, forward)].wire
             assert found.IsSame(O.BRepTools.OuterWire_s(forward))
     assert several >= 2
+
+
+def test_faces_that_occt_turns_with_their_wires_are_read_right_side_out(tmp_path):
+    """Of tori about axes that point down OCCT makes wires that run the wrong way, and turns the faces for it."""
+    spool = joined(box(10.0, 10.0, 4.0, (-5, -5, -2)), cylinder(2.0, 12.0, ((0, 0, -6), (0, 0, 1))))
+    circles = {
+        tuple(np.round([center.X(), center.Y(), center.Z(), curve.Radius()], 9)): one
+        for one in edges(spool)
+        if isinstance(curve := O.BRep_Tool.Curve_s(one, 0.0, 0.0), O.Geom_Circle)
+        for center in [curve.Location()]
+    }
+    assert len(circles) == 4
+    rounded = filleted(spool, 0.5, circles.values())
+    (body,) = asm.read_step(written(rounded, tmp_path / "spool.step"))
+    assert body.volume == pytest.approx(volumes(rounded)[1], rel=1e-9)
+    assert [face.kind for face in body.faces].count("torus") == 4

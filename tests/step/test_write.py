@@ -15,7 +15,8 @@ from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.occt import parts
 from assembly.step.solids import sewn
-from tests.step.models import MODELS, O, areas, faces, off, volumes
+from tests.step.models import MODELS, O, areas, box, edges, faces, filleted, off, volumes
+from tests.step.test_poles import read_by_occt
 
 HALF = np.sqrt(0.5)
 
@@ -353,3 +354,14 @@ def test_straight_edges_far_from_the_origin_stay_lines(tmp_path):
     assert "CIRCLE" not in path.read_text() and path.read_text().count("= LINE(") >= 3
     (again,) = asm.read_step(path)
     assert again.area == pytest.approx(sheet.area, rel=1e-11)
+
+
+def test_rounded_corners_far_from_the_origin_are_written(tmp_path):
+    """At 2e6 coordinates are rounded by more than curves on a small sphere are followed."""
+    block = box(3.0, 4.0, 5.0, (1e6, -2e6, 3e5))
+    rounded = filleted(block, 0.4, edges(block)[::2])
+    (body,) = asm.cad.from_occt(rounded)
+    path = tmp_path / "rounded.step"
+    asm.write_step(path, body)
+    (again,), shape = asm.read_step(path), read_by_occt(path)
+    assert again.volume == pytest.approx(body.volume, rel=1e-8) and O.BRepCheck_Analyzer(shape).IsValid()

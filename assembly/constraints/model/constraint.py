@@ -46,6 +46,8 @@ _EXPECTED = {
     RADIUS: f"a distance above zero; a point on a line is PointOnLine without one, and none is above {FARTHEST:g}",
     ANGLE: "an angle between 0 and pi, both excluded; axes along each other are Parallel, axes='aligned' or 'opposed'",
 }
+# What other arguments may be, by these: as a name it is an argument in the wrong place.
+_CHOICES = {"aligned": "axes", "opposed": "axes", "nearest": "axes", "inside": "side", "outside": "side"}
 _changes = 0
 
 
@@ -101,6 +103,9 @@ class Constraint(KnownSettings):
                 raise InputError(f"body {body.name!r} is named twice; expected distinct bodies")
         self._bodies = bodies
         self._name = f"{kind} {'-'.join(body.name for body in bodies)}".lstrip() if name is None else text("name", name)
+        choice = _CHOICES.get(self._name)
+        if choice and hasattr(type(self), choice):
+            raise InputError(f"name is {name!r}, which {choice} may be; expected {choice}={name!r}, or another name")
         self._may_be_renamed = name is None and self._is_numbered
 
     @property

@@ -291,6 +291,8 @@ def middle_frame(name: str, first: Any, second: Any) -> Frame:
     one, other = plane_frame(f"{name}[0]", first), plane_frame(f"{name}[1]", second)
     if one.body is not other.body:
         raise InputError(f"{name} is on bodies {one.body.name!r} and {other.body.name!r}; expected faces of one body")
+    if first == second:
+        raise InputError(f"{name} is {first!r} twice; expected two faces")
     z = one.axes[:, 2]
     if not are_parallel(z, other.axes[:, 2]):
         raise InputError(f"{name} is {first!r} and {second!r}, which are not parallel; expected parallel faces")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint
-from assembly.constraints.packing.scene_size import LEAST, MOST, Objectives, equations_of, marks_of
+from assembly.constraints.packing.scene_size import LEAST, MOST, ONE_PLACE, Objectives, equations_of, marks_of, reach_of
 from assembly.errors import FARTHEST
 from assembly.kinematics.body import Body
 from assembly.kinematics.frame import Frame
@@ -53,6 +53,7 @@ class MeasuredSize:
         self._rough = [hypot(*box) for box in self._boxes]
         self._take_longest()
         self._far = max(map(abs, chain.from_iterable(chain.from_iterable(self._marks))), default=0.0)
+        self._reach = reach_of(bodies, self._marks)
         self._asked: list[tuple[object, str]] = []
         self._fixed_asked = 0.0
         for equation in equations_of(constraints):
@@ -96,7 +97,7 @@ class MeasuredSize:
         """The size now; None where it rests on values and places in the world, or is out of range: measure in full."""
         size = max(self.shapes, self._on_bodies)
         if not self.shapes:
-            if size < LEAST:
+            if size < LEAST or size <= ONE_PLACE * max(self._far, self._reach):
                 return None
             for owner, name in self._asked:
                 size = max(size, abs(float(getattr(owner, name))))

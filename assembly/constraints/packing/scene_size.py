@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.dexterity import Dexterity
@@ -15,7 +15,18 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import length
 
-__all__ = ["LEAST", "MOST", "Objectives", "check_reach", "equations_of", "marks_of", "scene_size", "size_and_extent"]
+__all__ = [
+    "LEAST",
+    "MOST",
+    "ONE_PLACE",
+    "Objectives",
+    "check_reach",
+    "equations_of",
+    "marks_of",
+    "reach_of",
+    "scene_size",
+    "size_and_extent",
+]
 
 Array = NDArray[np.float64]
 Objectives = Sequence[tuple[float, Objective]]
@@ -28,9 +39,10 @@ ONE_PLACE = 4e-15
 def scene_size(bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives) -> float:
     """The size of a scene as it stands now; 0 where nothing in it is a length.
 
-    The largest body, by its shape or by the frames and points on it. Where none has a shape, a length that a row asks
-    for may be larger, and where no body has two marks, the distance of the farthest two in the world. Limits and
-    targets may be far away just to say "as far as it goes", so they count where there is nothing else, the smaller.
+    The largest body, by its shape or by the frames and points on it, where these are apart by more than rounding. Where
+    none has a shape, a length that a row asks for may be larger, and where no body has two marks, the distance of the
+    farthest two in the world. Limits and targets may be far away just to say "as far as it goes", so they count where
+    there is nothing else, the smaller.
 
     Raises
     ------
@@ -49,6 +61,8 @@ def size_and_extent(
     shapes = max(body.size for body in bodies)
     if shapes > 0.0:
         return _checked(max(shapes, on_bodies), marks), False
+    if on_bodies <= ONE_PLACE * reach_of(bodies, marks.values()):
+        on_bodies = 0.0
     rests_on_values = on_bodies < LEAST
     asked, limits = _lengths(constraints)
     known = max(on_bodies, asked)
@@ -149,6 +163,13 @@ def _farthest_target(bodies: Sequence[Body], objectives: Objectives) -> float:
 def _box(points: Sequence[Array]) -> float:
     """Diagonal of the box around points of a body, along its own axes."""
     return length(np.ptp(points, axis=0)) if points else 0.0
+
+
+def reach_of(bodies: Sequence[Body], marks: Iterable[Sequence[ArrayLike]]) -> float:
+    """The largest coordinate of a mark on its body, or of a body seen from the first one."""
+    on_bodies = max((float(np.abs(np.asarray(places)).max()) for places in marks if len(places)), default=0.0)
+    positions = np.array([body.pose.position for body in bodies])
+    return max(on_bodies, float(np.abs(positions - positions[0]).max()))
 
 
 def _farthest(points: Sequence[Array]) -> float:

@@ -280,6 +280,16 @@ def test_bodies_at_one_place_up_to_rounding_are_at_one_place():
     assert size_of(scene) == pytest.approx(4.0)
 
 
+@pytest.mark.parametrize("marks", [(0.0, 3e-16), (0.3, 0.1 + 0.2), (7.0, 7.0 + 1e-14)])
+def test_marks_that_rounding_alone_holds_apart_are_no_length(marks):
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm", position=(9.0, 9.0, 9.0))
+    scene = asm.Assembly([ground, arm])
+    low, high = marks
+    axes = asm.Parallel(ground.frame(z=(1, 0, 0)), arm.frame((low, 0, 0), z=(1, 0, 0)), axes="opposed")
+    scene.constrain(axes, asm.Spherical(ground.point(0, 0, 0), arm.point(high, 0, 0)))
+    assert size_of(scene) > 1.0 and scene.solve().success
+
+
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
 def test_a_scene_gets_its_size_when_something_is_a_length(unit):
     ground, arm, scene = bodies_at_one_place()
