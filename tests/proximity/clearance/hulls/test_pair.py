@@ -52,6 +52,14 @@ FITS = {
     ),
     "a ball on a ring": lambda off: (asm.shapes.torus(5, 1.5), asm.shapes.sphere(5 + off), at(0, 0, ON_RING)),
     "a ring around a ball": lambda off: (asm.shapes.sphere(5 + off), asm.shapes.torus(5, 1.5), at(0, 0, ON_RING)),
+    "a ball on a hole": lambda off: (PLATE, asm.shapes.sphere(5 + off), at(0, 0, 8)),
+    "a ball under a hole": lambda off: (asm.shapes.sphere(5 + off), PLATE, at(0, 0, 8)),
+    "a ball on a turned hole": lambda off: (
+        turned_part([(4, -5), (30, -5), (30, 5), (8, 5), (4, 1)]),
+        asm.shapes.sphere(12 + off),
+        at(0, 0, 5 + 80**0.5),
+    ),
+    "a ball in its seat": lambda off: (plug()[0], asm.shapes.sphere(10 + off), at(0, 0, 20 - 10 * 3**0.5)),
     "a plug in its seat": lambda off: (*plug(2.0 * off), at(0, 0, 0)),
     "a dovetail": lambda off: (*dovetail(2.0 * off), at(0, 0, 3)),
     "a block in a square hole": lambda off: (
@@ -191,6 +199,24 @@ def test_balls_beside_rings_are_judged():
             assert answer.bound <= distance + 1e-14
             told_of += 1
     assert told_of > 20
+
+
+def test_balls_on_holes_are_judged():
+    """Anywhere about a plate's hole, and in it: what is told is the distance, wherever the ball is not in the plate."""
+    rng, plate, told_of = np.random.default_rng(8), asm.shapes.plate(60, 40, 10, [(0, 0, 4.0)]), 0
+    for _ in range(200):
+        radius, place = rng.uniform(1.0, 6.0), rng.uniform((-4, -4, -12), (4, 4, 12))
+        beside, height = np.hypot(*place[:2]), abs(place[2])
+        distance = np.hypot(max(4.0 - beside, 0.0), max(height - 5.0, 0.0)) - radius
+        if beside > 4.0:
+            distance = height - 5.0 - radius
+        answer = told(plate, asm.shapes.sphere(radius), np.r_[place, 1.0, 0.0, 0.0, 0.0])
+        assert (answer is not None) == (distance > -TOUCHING), (radius, place)
+        if answer is not None:
+            # What is told of bodies that are far apart is a bound.
+            assert answer.bound <= distance + 1e-12
+            told_of += 1
+    assert told_of > 50
 
 
 def test_of_a_scene_all_pairs_or_none():
