@@ -85,6 +85,13 @@ class BodyHulls:
             rows[~self.is_ball] = -np.inf
         return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
 
+    def discs_of(self, face: int) -> Discs:
+        """The discs and points of all hulls of a face."""
+        ends = np.append(self.first, len(self.discs.radii))
+        last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)
+        rows = slice(int(ends[self.of_face[face]]), int(ends[last]))
+        return Discs(*(column[rows] for column in self.discs))
+
     def nearest(self, hollow: Hollow | Prism | Tube | Ring, face: int) -> Array:
         """The middle of the disc of a face (3,) that is nearest to the border of a hollow around it."""
         ends = np.append(self.first, len(self.discs.radii))
