@@ -17,21 +17,27 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._turn import Turn
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Coordinate, structure_changes
-from assembly.constraints.model.contact import Contact, lone_surfaces
+from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
-from assembly.constraints.model.tangent import ContactTangent
-from assembly.constraints.packing.earlier import adopted, is_alike, is_earlier, is_same_scene, taken_over
+from assembly.constraints.packing.earlier import (
+    adopted,
+    differs_in_joints,
+    handed_over,
+    is_alike,
+    is_earlier,
+    is_same_scene,
+    taken_over,
+)
+from assembly.constraints.packing.given_starts import place_starts, place_tangents
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.renumbered import renumbered
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
-from assembly.errors import InputError, vector
+from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.changes import changes, numbers_set
 from assembly.kinematics.pose import pose_rows
-from assembly.proximity.extrema.pairs import inside
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 
@@ -311,8 +317,9 @@ class PackedContents(Contents):
 
         Of poses the pairs of contacts may be known: `contacts` are their parameters.
         """
+        is_warm = isinstance(q0, Solution)
         if isinstance(q0, Solution):
-            state = self._state_of("q0", packed, q0).copy()
+            state, is_warm = self._begun_by(packed, q0)
         else:
             state = packed.new_state()
             q = state[: packed.contacts_at].reshape(-1, 7)
@@ -321,14 +328,32 @@ class PackedContents(Contents):
             state[packed.contacts_at : packed.angles_at] = np.nan
             if turns is not None:
                 state[packed.angles] = turns
-            self._place_tangents(packed, state)
+            place_tangents(packed, self._bodies, state)
             if contacts is not None:
                 state[packed.contacts_at :][: len(contacts)] = contacts
         if starts is not None:
-            self._place_starts(packed, state, starts)
+            place_starts(packed, state, starts)
         packed.refresh()
-        packed.start_angles(state, isinstance(q0, Solution))
+        packed.start_angles(state, is_warm)
         return state
+
+    def _begun_by(self, packed: Packed, q0: Solution) -> tuple[Array, bool]:
+        """The state in which a solve from a solution begins, and whether the turns of all angles are known."""
+        return self._handed_over(packed, q0) or (self._state_of("q0", packed, q0).copy(), True)
+
+    def _handed_over(self, packed: Packed, solution: Solution) -> tuple[Array, bool] | None:
+        """What a solution hands over that is of this scene before coordinates of joints became driven, free or limited.
+
+        And whether the turns of all angles are known. None where it is no such solution.
+        """
+        there, earlier = solution._scene, solution._ended.packed
+        if is_same_scene(earlier, packed) or len(there.bodies) != len(self._bodies):
+            return None
+        bodies_are_same = all(a is b for a, b in zip(there.bodies, self._bodies, strict=True))
+        are_same = _told(there.bodies, there.constraints) == _told(self._bodies, self._seated_constraints())
+        if not (bodies_are_same and are_same and differs_in_joints(earlier, packed)):
+            return None
+        return handed_over(earlier, packed, solution._ended.state)
 
     def _state_of(self, name: str, packed: Packed, solution: Solution) -> Array:
         earlier, state = solution._ended
@@ -343,37 +368,6 @@ class PackedContents(Contents):
             f"{name} is a solution of another assembly, or of this one before a change; expected its own, "
             "or one of a scene with the same bodies and constraints by name"
         )
-
-    def _place_tangents(self, packed: Packed, state: Array) -> None:
-        """Start tangents at pairs on the side that they ask for."""
-        for k, contact in enumerate(packed.contacts):
-            if isinstance(contact, ContactTangent) and not contact.edges:
-                q = state[: packed.contacts_at].reshape(-1, 7)
-                rows = (q[self._bodies.index(body)].copy() for body in (contact.body_a, contact.body_b))
-                start = contact.start_at(*rows)
-                if start is not None:
-                    at = packed.contacts_at + TRACK * k
-                    state[at : at + 4] = start
-                    state[at + 4 : at + TRACK] = 0.0
-
-    def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
-        if not isinstance(starts, Mapping):
-            raise TypeError(f"starts is {starts!r}; expected a mapping of constraint name to parameters")
-        names = [contact.name for contact in packed.contacts]
-        for name, value in starts.items():
-            if name not in names:
-                known = ", ".join(map(repr, names)) or "none, the assembly has no contacts"
-                raise InputError(f"starts names {name!r}; expected a contact: {known}")
-            k = names.index(name)
-            at = packed.contacts_at + TRACK * k
-            what = f"starts[{name!r}]"
-            surfaces = lone_surfaces(packed.sides[k])
-            if surfaces is None:
-                raise InputError(f"{what} is of solids with several faces; expected a contact of two faces")
-            state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
-            state[at + 4 : at + TRACK] = 0.0
-            # Rows that the last solve left are of other pairs.
-            state[packed.kept_at :] = 0.0
 
 
 def _told(bodies: Iterable[Body], constraints: Iterable[Constraint]) -> tuple[list[object], list[object]]:

@@ -137,11 +137,14 @@ class Solving(PackedContents):
             solution = standing_start(self._scene_itself, q0, settings, starts, interruption)
             if solution is not None:
                 return solution
-        if isinstance(q0, Solution):
+        has_other_joint_rows = isinstance(q0, Solution) and self._handed_over(self.packed(), q0) is not None
+        if isinstance(q0, Solution) and not has_other_joint_rows:
             return self._solved_beside(q0, rest, settings, starts, options, interruption)
         from assembly.studies.first_solve import first_solve
 
-        return first_solve(self._scene_itself, self._given(q0), settings, starts, options, interruption)
+        # A coordinate that becomes driven may have far to go, as from poses.
+        poses = q0.q if isinstance(q0, Solution) else self._given(q0)
+        return first_solve(self._scene_itself, poses, settings, starts, options, interruption)
 
     def _solved_beside(
         self,

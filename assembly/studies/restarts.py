@@ -67,8 +67,8 @@ def restarted(
         Asked by solves whether to go on.
     """
     if isinstance(given, Solution):
-        packed = given._packed
-        reference, turns = given.q, given._state[packed.angles]
+        packed = scene.packed()
+        reference, turns = given.q, scene._begun_by(packed, given)[0][packed.angles]
     else:
         reference, turns = given, None
     settings = settings.copy()

@@ -25,6 +25,7 @@ from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.manifolds.ball_manifolds import seats
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.solve.clearance_proof import answers_at, can_prove, proven_pairs
 from assembly.solve.interruption import Interruption
@@ -84,7 +85,7 @@ class Seat(NamedTuple):
     move : float
         Of a scene without an objective, what would be minimized: how far bodies were moved.
     has_bores : bool
-        Whether a shaft is in its bore, a cone in its seat or a ball in its socket; else only flat faces fit.
+        Whether a shaft is in its bore, a cone or a ball in its seat or a ball in its socket; else only flat faces fit.
     """
 
     poses: Array
@@ -223,7 +224,7 @@ def _is_beside(one: Array, other: Array, normal: Array) -> bool:
 
 
 def _round(one: _Face, other: _Face, axes: list[tuple[Array, Array]], names: Iterator[str]) -> Iterator[Constraint]:
-    """The joint of a shaft and its bore, a cone and its seat, a ball and its socket; one for each axis."""
+    """The joint of a shaft and its bore, a cone or a ball and its seat, a ball and its socket; one for each axis."""
     hollow, full = (other, one) if one.is_outward else (one, other)
     h, f = hollow.form, full.form
     if isinstance(h, Sphere) and isinstance(f, Sphere) and FILLS * h.radius <= f.radius <= (1.0 + 1e-9) * h.radius:
@@ -235,6 +236,10 @@ def _round(one: _Face, other: _Face, axes: list[tuple[Array, Array]], names: Ite
         if _is_near_axis((hollow, full), (h.point, h.axis), (f.point, f.axis), h.radius, axes):
             sense = np.sign((hollow.turn @ h.axis) @ (full.turn @ f.axis))
             yield Cylindrical(hollow.body.frame(h.point, h.axis), full.body.frame(f.point, sense * f.axis), next(names))
+    elif isinstance(h, Cylinder | Cone) and isinstance(f, Sphere):
+        for seat in seats(h, f):
+            if np.linalg.norm(hollow.at(seat) - full.at(f.center)) <= f.radius:
+                yield Spherical(hollow.body.point(*seat), full.body.point(*f.center), next(names))
     elif isinstance(h, Cone) and isinstance(f, Cone) and abs(h.half_angle - f.half_angle) < 1e-9:
         radius = max(f.heights) * np.tan(f.half_angle)
         if (hollow.turn @ h.axis) @ (full.turn @ f.axis) > 0.0 and _is_near_axis(

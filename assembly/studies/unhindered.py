@@ -65,7 +65,7 @@ def unhindered(
     interruption : Interruption
     """
     packed = scene.packed()
-    if last._ended[0] is not packed or scene._scene is None or not (can_prove(packed) and is_for_proofs(packed)):
+    if scene._scene is None or not (can_prove(packed) and is_for_proofs(packed)):
         return None
     if not last.success or packed.corners:
         return None

@@ -107,8 +107,7 @@ def test_what_has_changed_or_needs_more_goes_the_whole_way():
     scene.constraints[0].freedom().limits = (-9.0, 9.0)
     scene.constraints[0].angle = None
     assert straight_of(scene, begun) is None
-    with pytest.raises(asm.errors.InputError, match="q0 is a solution of another assembly"):
-        scene.solve(begun)
+    assert scene.solve(begun).success
 
     balls = [asm.Body(name, asm.shapes.sphere(1.0), (4.0 * k, 0, 0), fixed=k == 0) for k, name in enumerate("ab")]
     apart = asm.Assembly(balls)

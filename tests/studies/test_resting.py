@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.geometry.shapes.plane_curves import polygon
 from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.interruption import CTRL_C
 from assembly.studies.seated import seated
@@ -98,3 +99,63 @@ def _prism(points):
         length = float(np.linalg.norm(ends[1] - ends[0]))
         curves.append(asm.NurbsCurve(ends, [0.0, 0.0, length, length], 1))
     return asm.shapes.extrusion(curves, 30.0)
+
+
+# A cone of 30 degrees from 5 to 12.9, a hole of 8, and a countersink from 4 to 8; where a ball of 12 lies on each.
+SEATS = {
+    "seat": ([(5, -5 * 3**0.5), (25, -5 * 3**0.5), (25, 5), (10 + 5 / 3**0.5, 5)], 24 - 10 * 3**0.5),
+    "hole": ([(8, -5), (30, -5), (30, 5), (8, 5)], 5 + 80**0.5),
+    "countersink": ([(4, -5), (30, -5), (30, 5), (8, 5), (4, 1)], 5 + 80**0.5),
+}
+
+
+def ball_over(name, place):
+    """A ball of 12 over a turned part."""
+    seat = asm.Body("seat", asm.shapes.revolution(polygon(SEATS[name][0])), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(12.0), place)
+    scene = asm.Assembly([seat, ball])
+    scene.constrain(asm.Clearance())
+    return scene, ball
+
+
+@pytest.mark.parametrize("name", SEATS)
+def test_a_ball_comes_to_rest_where_it_touches_all_around(name):
+    """It has one row, at its nearest point, that jumped around: out of iterations, or stalled, at the right place."""
+    height = SEATS[name][1]
+    for place in ((0.0, 0.0, height), (1.0, 2.0, height + 4.0)):
+        for aim in ((0.0, 0.0, height - 3.0), (0.5, 0.2, height - 5.0)):
+            scene, ball = ball_over(name, place)
+            scene.minimize(asm.PointDistance(ball.point(0, 0, 0), aim))
+            solution = scene.solve()
+            assert solution.success and solution.proved, (place, aim)
+            np.testing.assert_allclose(solution.q[1, :3], (0.0, 0.0, height), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", SEATS)
+def test_a_ball_where_it_touches_all_around_stays(name):
+    scene, _ = ball_over(name, (0.0, 0.0, SEATS[name][1]))
+    solution = scene.solve()
+    assert solution.success and solution.proved and np.array_equal(solution.q, scene.q)
+
+
+@pytest.mark.parametrize("name", SEATS)
+def test_rows_of_a_ball_on_a_circle_are_its_slopes(name):
+    scene, _ = ball_over(name, (0.0, 0.0, SEATS[name][1]))
+    shapes = tuple(tuple(_faces(body)) for body in scene.bodies)
+    shift = np.array([0.0, 0.0, SEATS[name][1]])
+    normals, places, _ = closed_gaps(shapes, np.eye(3), shift, (-1e-9, 1e-9))
+    assert len(normals) >= 12
+    back, own, _ = closed_gaps(shapes[::-1], np.eye(3), -shift, (-1e-9, 1e-9))
+    np.testing.assert_allclose(back, -normals, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(own, places - shift, rtol=0, atol=1e-12)
+    # Each point of the ball goes off the wall's along the normal, at the rate of that.
+    feet, step = places.copy(), 1e-6 * np.array([0.3, -0.5, 0.8])
+    gaps = np.linalg.norm(shift + step - feet, axis=1) - 12.0
+    np.testing.assert_allclose(gaps, normals @ step, rtol=0, atol=1e-12)
+
+
+def test_a_ball_that_is_drawn_out_of_its_seat_is_not_held():
+    scene, ball = ball_over("seat", (0.0, 0.0, SEATS["seat"][1]))
+    scene.minimize(asm.PointDistance(ball.point(0, 0, 0), (0.0, 0.0, 20.0)))
+    solution = scene.solve()
+    assert solution.success and solution.q[1, 2] == pytest.approx(20.0, abs=1e-6)

@@ -1,6 +1,7 @@
 """States of an earlier packing of a scene: of another size, or with fewer slots for contacts of clearances.
 
-Another scene with the same bodies and rows (a pickle of this one, one that was built again) may give a state as well.
+Another scene with the same bodies and rows (a pickle of this one, one that was built again) may give a state as well,
+and so may this one from before coordinates of joints became driven, free or limited.
 """
 
 from __future__ import annotations
@@ -13,9 +14,20 @@ from numpy.typing import NDArray
 from assembly.proximity.features.solid_contact import TRACK
 
 if TYPE_CHECKING:
+    from assembly.constraints.model.constraint import Equation
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["adopted", "is_alike", "is_earlier", "is_same_scene", "stretch", "taken_over", "with_numbers_of"]
+__all__ = [
+    "adopted",
+    "differs_in_joints",
+    "handed_over",
+    "is_alike",
+    "is_earlier",
+    "is_same_scene",
+    "stretch",
+    "taken_over",
+    "with_numbers_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -82,7 +94,65 @@ def is_alike(one: Packed, packed: Packed) -> bool:
 
 def adopted(other: Packed, packed: Packed, state: Array) -> Array:
     """A state of another scene that is alike (`is_alike`) in this one; pairs of other faces are to be found anew."""
-    taken = taken_over(other, packed, state)
+    return _without_pairs_of_others(other, packed, taken_over(other, packed, state))
+
+
+def differs_in_joints(one: Packed, packed: Packed) -> bool:
+    """Whether two scenes of the same constraints have the same unknowns, and rows but for those of joints."""
+    counts = [
+        (each.is_implicit, len(each.contacts), each.trims, _joint_rows(each).stop - each.rows, _sides(each).size)
+        for each in (one, packed)
+    ]
+    return counts[0] == counts[1] and np.array_equal(one.unknown_blocks, packed.unknown_blocks)
+
+
+def handed_over(earlier: Packed, packed: Packed, state: Array) -> tuple[Array, bool]:
+    """A state of a scene with other rows of joints (`differs_in_joints`) in the one of now, and whether it is complete.
+
+    Angles keep their turns, and rows that both have their multipliers. Where an angle was not looked for before the
+    state is not complete: its turn is to be chosen as at poses.
+    """
+    taken = packed.new_state()
+    taken[: packed.contacts_at] = state[: earlier.contacts_at]
+    given = len(packed.contacts)
+    pairs = slice(packed.contacts_at, packed.contacts_at + TRACK * given)
+    taken[pairs] = state[pairs]
+    turns = dict(zip(earlier._angles, state[earlier.angles], strict=True))
+    taken[packed.angles] = [turns.get(angle, 0.0) for angle in packed._angles]
+    taken[_sides(packed)] = state[_sides(earlier)]
+    multipliers = np.zeros(packed.rows)
+    before, rows, others = state[earlier.multipliers_at :], _joint_rows(packed), _joint_rows(earlier)
+    multipliers[:given] = before[:given]
+    multipliers[rows.start - packed.trims : rows.start] = before[others.start - packed.trims : others.start]
+    pushed = dict(zip(map(_row, earlier._values), before[others.start : others.stop], strict=True))
+    multipliers[rows.start : rows.stop] = [pushed.get(_row(value), 0.0) for value in packed._values]
+    multipliers[rows.stop :] = before[others.stop : earlier.rows]
+    multipliers *= earlier.unit / packed.unit
+    multipliers[packed.lengths] *= packed.scale / earlier.scale
+    taken[packed.multipliers_at : packed.residuals_at] = multipliers
+    is_complete = all(angle in turns for angle in packed._angles)
+    return _without_pairs_of_others(earlier, packed, taken), is_complete
+
+
+def _joint_rows(packed: Packed) -> range:
+    """The numbers of the rows that joints and couplings have."""
+    first = len(packed.contacts) + packed.clearance_rows + packed.trims
+    return range(first, first + len(packed._values))
+
+
+def _sides(packed: Packed) -> NDArray[np.int64]:
+    """Where a state has what is tracked of sides of trims."""
+    return np.arange(packed.angles_at + TRACK * len(packed._angles), packed.multipliers_at)
+
+
+def _row(value: tuple[Equation, int, float]) -> tuple[object, ...]:
+    """What a row asks for, whatever its number."""
+    equation = value[0]
+    return *equation.terms, equation.source and equation.source[1]
+
+
+def _without_pairs_of_others(other: Packed, packed: Packed, taken: Array) -> Array:
+    """A state taken from another scene, where pairs of other faces are to be found anew."""
     nets = [[face.surface.control_points for face in each.faces] for each in (other, packed)]
     if packed.contacts and not all(np.array_equal(a, b) for a, b in zip(*nets, strict=True)):
         taken[packed.contacts_at : packed.contacts_at + TRACK * len(packed.contacts)] = np.nan

@@ -1,12 +1,13 @@
 """Rows of all manifolds of two bodies whose gaps are closed: every way in which the bodies hold each other there.
 
 Beside planes, lines, shafts and cones these are balls in their sockets: a ball of the socket's radius touches it in all
-directions that both faces have. What conforms only in part of a wall, as a shaft in half a bore, has rows of its planes
-and lines, and none all around.
+directions that both faces have; and balls in hollow cones and on rims of bores, along a circle. What conforms only in
+part of a wall, as a shaft in half a bore, has rows of its planes and lines, and none all around.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
+from assembly.proximity.manifolds.ball_manifolds import touched_circles
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
 from assembly.proximity.manifolds.line_manifolds import line_manifolds
@@ -26,6 +28,8 @@ Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
 # Directions of a ball, along each parameter of its face.
 DIRECTIONS = 9
+# Directions about the axis of a wall in which a ball may touch it.
+AROUND = 12
 # What is as near to a surface, in parts of its radius, is on it; so many steps of Newton's method lead there.
 ON_FACE, STEPS = 1e-8, 6
 # A surface that goes all around does to within so much [rad].
@@ -53,9 +57,9 @@ def closed_gaps(
         *line_manifolds(shapes, turn, shift, within),
         *wall_manifolds(shapes, turn, shift, within),
     ]
-    normals, places = _balls(shapes, turn, shift, within)
-    normals = np.concatenate([*(manifold.normals for _, manifold in found), normals])
-    places = np.concatenate([*(manifold.places for _, manifold in found), places])
+    balls = [_balls(shapes, turn, shift, within), *_seats(shapes, turn, shift, within)]
+    normals = np.concatenate([*(manifold.normals for _, manifold in found), *(rows[0] for rows in balls)])
+    places = np.concatenate([*(manifold.places for _, manifold in found), *(rows[1] for rows in balls)])
     return normals, places, np.arange(len(normals)) < sum(len(manifold.gaps) for _, manifold in flat)
 
 
@@ -148,3 +152,33 @@ def _balls(shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple
             normals.append(out[kept] if is_ball else -out[kept])
             places.append(points[kept])
     return np.concatenate(normals), np.concatenate(places)
+
+
+@lru_cache(maxsize=256)
+def _hollow_walls(faces: Faces) -> tuple[Cylinder | Cone, ...]:
+    """The bores and hollow cones among a body's faces that are whole."""
+    found = zip(*walls(faces), strict=True)
+    return tuple(
+        one.form
+        for face, one in found
+        if isinstance(one.form, Cylinder | Cone) and not one.is_outward and _is_whole(face)
+    )
+
+
+def _seats(
+    shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple[float, float]
+) -> Iterator[tuple[Array, Array]]:
+    """Normals and places (m, 3) of balls in hollow walls, where they touch these or their rims all around."""
+    low, high = within
+    for k in range(2):
+        for wall in _hollow_walls(shapes[k]):
+            for face, ball, is_ball in _spheres(shapes[1 - k]):
+                center = turn @ ball.center + shift if k == 0 else (ball.center - shift) @ turn
+                for points, normals in touched_circles(wall, center, AROUND) if is_ball else ():
+                    gaps = np.einsum("ij,ij->i", center - points, normals) - ball.radius
+                    if not (low <= gaps.min() and gaps.max() <= high):
+                        continue
+                    places = center - ball.radius * normals
+                    own = (places - shift) @ turn if k == 0 else places @ turn.T + shift
+                    kept = _has(face, own, ball.radius)
+                    yield (normals[kept], places[kept]) if k == 0 else (-normals[kept] @ turn.T, own[kept])

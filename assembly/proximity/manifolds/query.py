@@ -13,6 +13,7 @@ from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import PoseLike, pose_row, rotation_of
+from assembly.proximity.manifolds.ball_manifolds import ball_rows
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import flat_manifold
 from assembly.proximity.manifolds.line_manifolds import line_manifold
@@ -92,8 +93,8 @@ def contact_manifold(
     """The contact manifold of two faces that conform, or nearly (docs/certified.md).
 
     Plane on plane: corners of what both trimmed faces have in common, and places on arcs. A cylinder in a bore, a cone
-    in a hollow one: two rings. A ball in its socket: where it is nearest, both being whole. A cylinder or a cone on a
-    plane: the ends of a line; a ball on a plane: its point.
+    in a hollow one: two rings. A ball in its socket: where it is nearest, both being whole; in a hollow cone or in a
+    bore: a ring. A cylinder or a cone on a plane: the ends of a line; a ball on a plane: its point.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def _full(side: Side | None) -> Cylinder | Cone | Sphere | None:
 
 
 def _fitting(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone | Sphere, Cylinder | Cone | Sphere] | None:
-    """Two cylinders, balls, or cones of one angle, of which one is hollow and one full."""
+    """Two cylinders, balls, or cones of one angle, of which one is hollow and one full; or a ball in a hollow wall."""
     if not isinstance(a, ElementaryFace) or not isinstance(b, ElementaryFace) or a.is_outward == b.is_outward:
         return None
     one, other = a.form, b.form
@@ -160,6 +161,10 @@ def _fitting(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone | Sphere, 
         if isinstance(one, kind) and isinstance(other, kind):
             return one, other
     if isinstance(one, Cone) and isinstance(other, Cone) and abs(one.half_angle - other.half_angle) <= SAME_ANGLE:
+        return one, other
+    if b.is_outward and isinstance(one, Cylinder | Cone) and isinstance(other, Sphere):
+        return one, other
+    if a.is_outward and isinstance(one, Sphere) and isinstance(other, Cylinder | Cone):
         return one, other
     return None
 
@@ -176,7 +181,7 @@ def _is_exchanged(faces: tuple[BodyFace, BodyFace], sides: tuple[Side | None, Si
     kinds = " and a ".join(face.kind for face in faces)
     raise InputError(
         f"a and b are {faces[0]!r} and {faces[1]!r}, a {kinds}; expected planes with edges of lines and arcs, a "
-        "cylinder, a cone or a ball in a hollow one, or what is round on a plane"
+        "cylinder, a cone or a ball in a hollow one, a ball in a bore, or what is round on a plane"
     )
 
 
@@ -191,7 +196,7 @@ class _Found:
     sides : (Side, Side)
     turn, shift : (3, 3), (3,)
     manifold : Manifold or None
-        None of a ball in its socket.
+        None of a ball in what is hollow.
     known : tuple of Row or None
         Rows, where gaps, normals and places are theirs; else these are those of the manifold.
     bound : float
@@ -265,5 +270,8 @@ def _find(first: int, sides: tuple[Side | None, Side | None], turn: Array, shift
     if isinstance(hollow, Sphere) and isinstance(inner, Sphere):
         socket = socket_row(hollow, inner, turn, shift)
         return None if socket is None else _Found(first, (a, b), turn, shift, None, tuple(socket[0]), socket[1])
+    if not isinstance(hollow, Sphere) and isinstance(inner, Sphere):
+        ring = ball_rows(hollow, inner, turn, shift)
+        return None if ring is None else _Found(first, (a, b), turn, shift, None, tuple(ring[0]), ring[1])
     manifold = round_manifold(*_walls(a, b), turn, shift)
     return None if manifold is None else _Found(first, (a, b), turn, shift, manifold, None, manifold.bound)

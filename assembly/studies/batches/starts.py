@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.model.tangent import ContactTangent
+from assembly.constraints.packing.given_starts import place_tangents
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.packing.scene_size import check_reach
 from assembly.errors import check_coordinates, real_array
@@ -71,7 +72,7 @@ def begun_states(
     begun[:, packed.contacts_at : packed.angles_at] = np.nan
     if any(isinstance(item, ContactTangent) for item in packed.contacts):
         for state in begun:
-            scene._place_tangents(packed, state)
+            place_tangents(packed, scene.bodies, state)
     if packed._turned.chosen:
         for state in begun:
             packed.start_angles(state, warm=False)

@@ -7,6 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.geometry.shapes.plane_curves import polygon
 from assembly.kinematics.pose import retract
 from assembly.proximity import contact_manifold
 
@@ -114,6 +115,42 @@ def test_a_ball_in_its_socket_has_one_row():
     np.testing.assert_allclose(normal, AWAY.matrix[:3, 2], rtol=0, atol=1e-14)
     ball.pose = pose_of((0.6, 0.0, 0.0))
     assert contact_manifold(socket.faces[0], ball.faces[0]) is None
+
+
+def hollow(angle):
+    """A body with a wall about z, a cone with its apex at the origin or a bore of 0.7."""
+    low, high = (0.004, 3.0) if angle > 0.0 else (-3.0, 3.0)
+    near, far = (0.7, 0.7) if angle == 0.0 else (low * np.tan(angle), high * np.tan(angle))
+    loop = polygon([(near, low), (9.0, low), (9.0, high), (far, high)])
+    body = asm.Body("wall", asm.shapes.revolution(loop))
+    # The outer wall is a cylinder of 9.
+    walls = [*body.faces.cones(), *body.faces.cylinders()]
+    return body, next(face for face in walls if face.face.surface.bounding_box()[1][0] < 8.5)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2, np.pi / 6, 1.2])
+def test_a_ball_in_a_hollow_wall_has_a_ring(angle, cases):
+    """Its least gap is that of samples of the wall, exactly, and no sample is below the bound."""
+    body, face = hollow(angle)
+    rng = np.random.default_rng(9)
+    u, v = (np.linspace(*ends, 150) for ends in face.face.surface.domain)
+    wall = face.face.surface.evaluate(u[:, None], v[None, :]).reshape(-1, 3)
+    for _ in range(cases(20, 500)):
+        radius = rng.uniform(0.2, 0.6)
+        ball = asm.Body("ball", asm.shapes.sphere(radius))
+        height = 0.0 if angle == 0.0 else radius / np.sin(angle)
+        center = np.append(rng.normal(scale=0.03, size=2), height) + rng.normal(scale=0.03, size=3)
+        body.pose, ball.pose = AWAY, pose_of(center, (0.5, 0.1, -0.7, 0.5))
+        found, exchanged = contact_manifold(face, ball.faces[0]), contact_manifold(ball.faces[0], face)
+        assert len(found.gaps) == 5 and found.gaps[4] <= found.gaps.min() + 1e-14
+        np.testing.assert_allclose(exchanged.normals, -found.normals, rtol=0, atol=1e-14)
+        gap = (np.linalg.norm(wall - center, axis=1) - radius).min()
+        assert found.bound <= gap and gap < found.bound + 1e-2 and found.gaps[4] - 1e-12 < found.bound <= found.gaps[4]
+        # Points of the ball, along the normals from points of the wall.
+        at = np.linalg.norm(found.places - ball.pose.position, axis=1)
+        np.testing.assert_allclose(at, radius, rtol=0, atol=1e-12)
+    ball.pose = pose_of((0.0, 0.0, 30.0))
+    assert contact_manifold(face, ball.faces[0]) is None
 
 
 def test_faces_that_have_nothing_in_common():

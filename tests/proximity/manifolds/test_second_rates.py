@@ -70,6 +70,18 @@ PAIRS = {
         DOWN,
         0.08,
     ),
+    "ball in a hollow cone": (
+        lambda: wall(cone(3.0, 0.2)),
+        lambda: asm.Body("ball", asm.shapes.sphere(1.0)).faces[0],
+        DOWN,
+        1.6,
+    ),
+    "ball in a bore": (
+        lambda: wall(asm.shapes.plate(4.0, 4.0, 1.0, [(0.0, 0.0, 0.5)]), hole=True),
+        lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0],
+        DOWN,
+        0.1,
+    ),
     "ball": (lambda: sheet(circle(2.0)), lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0], DOWN, 0.4),
 }
 RINGS = ("shaft", "long shaft", "cone in its seat", "long cone")

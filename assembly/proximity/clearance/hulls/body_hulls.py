@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Tube
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube
 
 __all__ = ["BodyHulls", "hulls_of_body"]
 
@@ -52,7 +52,7 @@ class BodyHulls:
         What is not convex counts as several faces, one for each part: the number of the whole face.
     points, owner : (p, 3), (p,) of int
         Points that are on faces, corners among them, and the face of each.
-    hollows : tuple of (int, Hollow, Prism or Tube)
+    hollows : tuple of (int, Hollow, Prism, Tube or Ring)
         Sets into whose inside no point of a face goes, with the face.
     directions : (d, 3)
         Normals of flat faces and axes, up to their senses.
@@ -67,7 +67,7 @@ class BodyHulls:
     part_of: Table
     points: Array
     owner: Table
-    hollows: tuple[tuple[int, Hollow | Prism | Tube], ...]
+    hollows: tuple[tuple[int, Hollow | Prism | Tube | Ring], ...]
     directions: Array
     centers: Array
     axes: Array
@@ -77,15 +77,22 @@ class BodyHulls:
         rows = self.discs.reach(normals)
         return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
 
-    def within(self, hollow: Hollow | Prism | Tube) -> Array:
+    def within(self, hollow: Hollow | Prism | Tube | Ring) -> Array:
         """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
         rows = hollow.depth(self.discs)
-        if isinstance(hollow, Tube):
+        if isinstance(hollow, Tube | Ring):
             # It is not convex: what is in it with all of its discs need not be.
             rows[~self.is_ball] = -np.inf
         return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
 
-    def nearest(self, hollow: Hollow | Prism | Tube, face: int) -> Array:
+    def discs_of(self, face: int) -> Discs:
+        """The discs and points of all hulls of a face."""
+        ends = np.append(self.first, len(self.discs.radii))
+        last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)
+        rows = slice(int(ends[self.of_face[face]]), int(ends[last]))
+        return Discs(*(column[rows] for column in self.discs))
+
+    def nearest(self, hollow: Hollow | Prism | Tube | Ring, face: int) -> Array:
         """The middle of the disc of a face (3,) that is nearest to the border of a hollow around it."""
         ends = np.append(self.first, len(self.discs.radii))
         last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.hulls.flat_hulls import hulls_of_flat
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Tube, parts_of_one
+from assembly.proximity.clearance.hulls.flat_hulls import hole_of_ring, hulls_of_flat
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube, parts_of_one
 from assembly.proximity.clearance.hulls.looped_part import looped_part
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 from assembly.proximity.manifolds.flat_map import FlatMap, flat_map
@@ -43,9 +43,10 @@ def hulls_of_face(face: Face) -> list[FaceHulls]:
     form = nearly_elementary(surface)
     if isinstance(form, Plane):
         net = surface.control_points.reshape(-1, 3)
-        return [FaceHulls([(Discs.of_points(net), 0.0)], [], points, form.normal, None)]
+        return [FaceHulls([(Discs.of_points(net), 0.0)], hole_of_ring(surface, form.normal), points, form.normal, None)]
     part = looped_part(face)
-    around, line, hollows = _of_form(form, part), _line_of(form), _hollow(form, face)
+    around, line = _of_form(form, part), _line_of(form)
+    hollows = [*_hollow(form, face), *_rings(form, face, around)]
     known = hollows, points, _axis_of(form), line
     if around is not None and _is_all_around(form):
         return [FaceHulls([around], hollows, points, _axis_of(form), line)]
@@ -100,6 +101,15 @@ def _hollow(form: Form, face: Face) -> list[Hollow | Prism | Tube]:
             through = Hollow(form.center, form.axis, form.major - outer)
             return [through, Tube(form.center, form.axis, form.major, outer, True, True)]
     return []
+
+
+def _rings(form: Form, face: Face, around: tuple[Discs, float] | None) -> list[Ring]:
+    """The part of a hollow cylinder or cone between its ends, for balls that lie on these or on it."""
+    if around is None or not isinstance(form, (Cylinder, Cone)) or form.outward == (face.sign > 0):
+        return []
+    (first, last), radii = around[0].centers, around[0].radii
+    ends = np.array([[0.0, radii[0]], [float((last - first) @ form.axis), radii[1]]])
+    return [Ring(first, form.axis, ends, around[1])]
 
 
 def _axis_of(form: Form) -> Array | None:

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.curves import Circle
+from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.splines.curve import NurbsCurve
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, parts_of_one
+from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, parts_of_one
 from assembly.proximity.clearance.hulls.triangles import triangles_of
 from assembly.proximity.manifolds.flat_map import FlatMap
 
-__all__ = ["hulls_of_flat"]
+__all__ = ["hole_of_ring", "hulls_of_flat"]
 
 Array = NDArray[np.float64]
 # Of every curve of a boundary the circle that it is on, or None.
@@ -87,17 +88,18 @@ def _disc(circle: Circle) -> Discs:
     return Discs(circle.center[None], circle.axis[None], np.array([circle.radius]))
 
 
-def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow | Prism]:
+def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow | Prism | Ring]:
     """The holes of a flat face that are convex polygons; of others with an arc the largest disc about its middle."""
-    found: list[Hollow | Prism] = []
+    found: list[Hollow | Prism | Ring] = []
+    size = face.surface.size
     for number, chain in enumerate(face.chains[1:] if face.holes else (), 1):
         corners = _corners(face, flat, number)
         if corners is not None:
-            found += _prism(corners, normal, face.surface.size, flat.off)
+            found += _prism(corners, normal, size, flat.off)
             continue
         whole = _whole(face, flat, chain, arcs)
         if whole is not None:
-            found += _disc_hole(whole.center, normal, whole.radius - whole.deviation - flat.off)
+            found += _disc_hole(whole.center, normal, whole.radius - whole.deviation - flat.off, size)
             continue
         circle = next((arcs[k] for k in chain if arcs[k] is not None), None)
         if circle is None or not _is_beside(face, flat, circle.center):
@@ -105,15 +107,41 @@ def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow 
         # All of the boundary is beyond, so that the disc is wholly in the hole.
         curves = zip(face.boundary, arcs, strict=True)
         least = min(_distance(flat, curve, arc, circle.center) for curve, arc in curves)
-        found += _disc_hole(circle.center, normal, least - flat.off)
+        found += _disc_hole(circle.center, normal, least - flat.off, size)
     return found
 
 
-def _disc_hole(center: Array, normal: Array, radius: float) -> list[Hollow | Prism]:
-    return [Hollow(center, normal, radius)] if radius > 0.0 else []
+def _disc_hole(center: Array, normal: Array, radius: float, size: float) -> list[Hollow | Prism | Ring]:
+    """What goes through a disc in a flat face of a size, and balls that lie on its rim."""
+    if not radius > 0.0:
+        return []
+    beyond = np.array([[0.0, radius], [0.0, radius + size]])
+    return [Hollow(center, normal, radius), Ring(center, normal, beyond, 0.0)]
 
 
-def _prism(corners: Array, normal: Array, size: float, off: float) -> list[Hollow | Prism]:
+def hole_of_ring(surface: NurbsSurface, normal: Array) -> list[Hollow | Prism | Ring]:
+    """The hole of a flat ring that a line drew: circles about one center, of control points in the same directions."""
+    tolerance = NEARLY * surface.size
+    for way, other in ((0, 1), (1, 0)):
+        if not surface.closed[way] or surface.degree[other] != 1:
+            continue
+        pieces = np.moveaxis(surface.bezier_pieces(), (way, way + 2), (0, 2))
+        net, weights = np.moveaxis(surface.control_points, way, 0), np.moveaxis(surface.weights, way, 0)
+        if np.ptp(weights, axis=1).any():
+            continue
+        for first, step in ((0, 1), (-1, -1)):
+            circle = curve_form([pieces[:, first, :, first]], tolerance)
+            if not isinstance(circle, Circle):
+                continue
+            # Each line of control points leads straight away from the center.
+            off = (net - circle.center)[:, ::step]
+            grown = (off * off[:, :1]).sum(axis=2) / (off[:, :1] ** 2).sum(axis=2)
+            if np.abs(off - grown[0, :, None] * off[:, :1]).max() <= tolerance and (np.diff(grown[0]) > 0.0).all():
+                return _disc_hole(circle.center, normal, circle.radius - circle.deviation - tolerance, surface.size)
+    return []
+
+
+def _prism(corners: Array, normal: Array, size: float, off: float) -> list[Hollow | Prism | Ring]:
     """The hole with these corners, which go around it clockwise, if it is convex."""
     inward = -_inward(corners, normal)
     inward, borders = inward[inward.any(axis=1)], (inward * corners).sum(axis=1)[inward.any(axis=1)]

@@ -1,4 +1,4 @@
-"""Discs, what hulls are made of, and hollows: convex sets into which a face does not go, and tubes, for balls alone."""
+"""Discs, what hulls are made of, and hollows: convex sets into which faces do not go; tubes and rings, for balls."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "Tube", "parts_of_one"]
+__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "Ring", "Tube", "parts_of_one"]
 
 Array = NDArray[np.float64]
 # [radii] A point so near to an axis is on it: rounding decides where it is seen from there.
@@ -217,6 +217,74 @@ class Tube(NamedTuple):
         return self._replace(center=left * self.center + shift, major=left * self.major, minor=left * self.minor)
 
 
+class Ring(NamedTuple):
+    """What is beside a part of a cone, a cylinder or a plane about an axis: how far a ball is off it is known exactly.
+
+    A ball goes through the hole that it lies on, and into the bore: no plane is between, nor is it in the cylinder.
+
+    Attributes
+    ----------
+    center, normal : (3,)
+        A point of the axis, and its direction.
+    ends : (2, 2)
+        A straight profile: of both ends the height over the center, and the distance from the axis.
+    off : float
+        What the face may be off it.
+    """
+
+    center: Array
+    normal: Array
+    ends: Array
+    off: float
+    # No half line is known to stay in it.
+    axis: Array = np.zeros(3)
+    slope: float = 0.0
+    is_wall: bool = True
+
+    def depth(self, discs: Discs) -> Array:
+        """How far the centers of discs (m,) are away: of balls, which are points with a radius, their centers."""
+        return self.depth_of(discs.centers)
+
+    def _seen(self, points: Array) -> tuple[Array, Array]:
+        """Heights of points and their distances from the axis (m, 2), and of the profile what is nearest to each."""
+        away = points - self.center
+        height = away @ self.normal
+        beside = np.linalg.norm(away - height[:, None] * self.normal, axis=1)
+        seen = np.stack([height, beside], axis=1)
+        way = self.ends[1] - self.ends[0]
+        part = np.clip((seen - self.ends[0]) @ way / (way @ way), 0.0, 1.0)
+        return seen, self.ends[0] + part[:, None] * way
+
+    def depth_of(self, points: Array) -> Array:
+        """How far points (m, 3) are away."""
+        seen, nearest = self._seen(points)
+        return np.asarray(np.hypot(*(seen - nearest).T) - self.off)
+
+    def planes(self, near: Array) -> tuple[Array, Array]:
+        """Half spaces at whose borders it is, where it is next to a point (3,), and around from there."""
+        (seen,), (nearest,) = self._seen(near[None])
+        away = near - self.center
+        beside = away - (away @ self.normal) * self.normal
+        if not np.linalg.norm(beside) > ON_AXIS * float(np.abs(self.ends[:, 1]).max()):
+            beside = np.cross(self.normal, np.eye(3)[np.abs(self.normal).argmin()])
+        around = _around(self.normal, beside)
+        feet = self.center + nearest[0] * self.normal + nearest[1] * around
+        ways = near - feet
+        lengths = np.linalg.norm(ways, axis=1)
+        if not (lengths > 0.0).all():
+            return np.empty((0, 3)), np.empty(0)
+        inward = ways / lengths[:, None]
+        return inward, (inward * feet).sum(axis=1) + self.off
+
+    def posed(self, turn: Array, shift: Array) -> Ring:
+        """The same after x -> turn x + shift."""
+        return self._replace(center=turn @ self.center + shift, normal=turn @ self.normal)
+
+    def scaled(self, left: float, shift: Array) -> Ring:
+        """The same after x -> left x + shift."""
+        return self._replace(center=left * self.center + shift, ends=left * self.ends, off=left * self.off)
+
+
 def _around(axis: Array, first: Array, count: int = 12) -> Array:
     """Unit vectors (count, 3) across an axis, equally far apart, from one of any length that is across it."""
     across = first / np.linalg.norm(first)
@@ -235,7 +303,7 @@ class FaceHulls(NamedTuple):
     ----------
     hulls : list of (Discs, float)
         Each with the radius of a ball around all of it.
-    hollows : sequence of Hollow, Prism or Tube
+    hollows : sequence of Hollow, Prism, Tube or Ring
     points : (p, 3)
         Points of it.
     direction : (3,) or None
@@ -245,7 +313,7 @@ class FaceHulls(NamedTuple):
     """
 
     hulls: list[tuple[Discs, float]]
-    hollows: Sequence[Hollow | Prism | Tube]
+    hollows: Sequence[Hollow | Prism | Tube | Ring]
     points: Array
     direction: Array | None
     line: tuple[Array, Array] | None

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls
+from assembly.proximity.clearance.hulls.hollows import Ring, Tube
 from assembly.proximity.clearance.hulls.outside import is_outside
 from assembly.proximity.clearance.parting import least_change
 
@@ -36,6 +37,8 @@ OPENED = (0.25, 0.05, 0.01)
 ROUNDS = 6
 # The cosine of an angle between directions that are taken for one.
 SAME = 1.0 - 1e-9
+# Pairs of faces, of which planes along what is round are tried, at most; decimals to which these are others.
+BESIDE, EQUAL = 32, 12
 # Directions for discs, and for two faces, of all pairs of them, that are tried at most: of bodies of very many faces
 # the proof by cells tells more quickly. Lines of a body that others are beside.
 MOST, LINES = 2_000_000, 8
@@ -93,7 +96,7 @@ class _Gaps:
         places = [{int(face): place for place, face in enumerate(near)} for near in (self.near_a, self.near_b)]
         for number, (face, hollow) in enumerate((*self.a.hollows, *self.b.hollows)):
             others, place = (self.b, places[0].get(face)) if number < count else (self.a, places[1].get(face))
-            if place is None:
+            if place is None or (isinstance(hollow, Tube | Ring) and not others.is_ball.any()):
                 continue
             depth = others.within(hollow)[self.near_b if number < count else self.near_a]
             row = by_hollow[place] if number < count else by_hollow[:, place]
@@ -181,6 +184,11 @@ def answer_by_hulls(a: BodyHulls, b: BodyHulls, least: float, touching: float) -
         return None
     # Of faces that are not near it is more.
     bound = min(_bound(gaps), least + 2.0 * touching + rounding)
+    more = _tangents(gaps, least - touching) if bound <= least - touching else np.empty((0, 3))
+    if len(more):
+        half = np.concatenate([normals[: len(normals) // 2], more])
+        gaps = _Gaps(a, b, least + 2.0 * touching + rounding, np.concatenate([half, -half]))
+        bound = min(_bound(gaps), least + 2.0 * touching + rounding)
     if bound > least + rounding:
         return Answer(Verdict.CLEAR, bound - rounding) if _are_apart(gaps, bound, rounding) else None
     # So deep as that faces are not opened at all.
@@ -193,6 +201,28 @@ def _bound(gaps: _Gaps) -> float:
     """The least gap of faces that are near, infinite where none are."""
     by_plane, _, by_hollow, _ = gaps.of_faces()
     return float(np.maximum(by_plane, by_hollow).min(initial=np.inf))
+
+
+def _tangents(gaps: _Gaps, below: float) -> Array:
+    """Normals of planes along what is round through corners of faces that are beside it, of gaps below a length.
+
+    So the flank of a slot, whose edge lies on a shaft, is parted from that. None where there are many such faces.
+    """
+    by_plane, _, by_hollow, _ = gaps.of_faces()
+    pairs = np.argwhere(np.maximum(by_plane, by_hollow) < below)
+    ways = [np.empty((0, 3))]
+    for i, j in pairs.tolist() if len(pairs) <= BESIDE else ():
+        a, b = gaps.a.discs_of(int(gaps.near_a[i])), gaps.b.discs_of(int(gaps.near_b[j]))
+        for one, other in ((a, b), (b, a)):
+            wide = int(np.argmax(one.radii))
+            if one.radii[wide] > 0.0:
+                off = other.centers[other.radii == 0.0] - one.centers[wide]
+                ways.append(off - (off @ one.axes[wide])[:, None] * one.axes[wide])
+    rows = np.concatenate(ways)
+    lengths = np.linalg.norm(rows, axis=1)
+    rows = rows[lengths > 0.0] / lengths[lengths > 0.0, None]
+    _, first = np.unique(rows.round(EQUAL), axis=0, return_index=True)
+    return np.asarray(rows[np.sort(first)])
 
 
 def _are_apart(gaps: _Gaps, bound: float, rounding: float) -> bool:

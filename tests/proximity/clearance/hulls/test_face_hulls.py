@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.geometry.shapes.plane_curves import circle
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
-from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism, Tube
+from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism, Ring, Tube
 from assembly.proximity.clearance.hulls.triangles import triangles_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.studies.machined import bolt, retaining_ring, socket, turned_part
@@ -146,7 +146,8 @@ def test_a_flat_face_is_beside_the_cone_that_goes_through_its_hole():
 def test_a_flat_face_is_beside_the_ball_that_goes_through_its_hole():
     def beside_balls(faces):
         hulls = hulls_of_body(faces)
-        return [(faces[hulls.part_of[k]], hollow) for k, hollow in hulls.hollows if not hollow.axis.any()]
+        hollows = [(k, hollow) for k, hollow in hulls.hollows if isinstance(hollow, Hollow)]
+        return [(faces[hulls.part_of[k]], hollow) for k, hollow in hollows if not hollow.axis.any()]
 
     balls = beside_balls(faces_of(retaining_ring(12.0, 22.0, 0.6)))
     # The seat itself, and both ends.
@@ -225,6 +226,40 @@ def test_a_tube_and_a_ball_are_apart_by_what_samples_say(outside):
         inward, borders = tube.planes(center)
         least = (inward @ center - borders).min()
         assert abs(least - depth) < 1e-12
+
+
+@pytest.mark.parametrize("ends", [((-1.0, 2.0), (3.0, 2.0)), ((0.5, 1.0), (2.0, 2.5)), ((0.0, 1.5), (0.0, 6.0))])
+def test_a_ring_and_a_ball_are_apart_by_what_samples_say(ends):
+    """The depth of a ball's center is the distance to samples, and half spaces say no less of it."""
+    rng = np.random.default_rng(8)
+    made = Ring(np.array([0.1, -0.2, 0.3]), direction(rng), np.array(ends), 0.0)
+    angle, part = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 600), np.linspace(0.0, 1.0, 200)))
+    across = np.linalg.svd(made.normal[None])[2][1:]
+    height, beside = made.ends[0][:, None] + part * (made.ends[1] - made.ends[0])[:, None]
+    ways = np.cos(angle)[:, None] * across[0] + np.sin(angle)[:, None] * across[1]
+    surface = made.center + height[:, None] * made.normal + beside[:, None] * ways
+    assert np.abs(made.depth_of(surface)).max() < 1e-12
+    for k in range(20):
+        center = made.center + made.normal if k == 0 else surface[rng.integers(len(surface))] + 0.5 * rng.normal(size=3)
+        depth, sampled = made.depth_of(center[None])[0], np.linalg.norm(surface - center, axis=1).min()
+        # Samples are up to 0.07 from each other.
+        assert depth <= sampled + 1e-12 and sampled <= depth + 0.07
+        inward, borders = made.planes(center)
+        assert abs((inward @ center - borders).min() - depth) < 1e-12
+    # At its very profile a point is on no side of it.
+    level = Ring(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(ends), 0.0)
+    assert not len(level.planes(np.array([ends[0][1], 0.0, ends[0][0]]))[0])
+
+
+def test_flat_rings_that_are_turned_have_holes():
+    """As plates with holes have: a pin through one was left to cells, and a ball that goes into it."""
+    for part in (turned_part([(4, -5), (30, -5), (30, 5), (8, 5), (4, 1)]), SHAPES["seat"]):
+        flat = [face for face in faces_of(part) if np.ptp(samples(face)[:, 2]) < 1e-9]
+        assert len(flat) == 2
+        for face in flat:
+            hollow, around = (hollow for _, hollow in hulls_of_body((face,)).hollows)
+            assert isinstance(hollow, Hollow) and isinstance(around, Ring)
+            assert hollow.radius == pytest.approx(np.hypot(*samples(face).T[:2]).min(), abs=1e-7)
 
 
 def test_poses_and_scales_move_all_of_it():

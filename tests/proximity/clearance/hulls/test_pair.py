@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly.geometry.shapes.plane_curves import circle
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls import outside, pair
@@ -38,6 +39,22 @@ def plug(thicker=0.0):
     return seat, turned_part([(0, -4 * s), (6 + thicker, -4 * s), (12 + thicker, 2 * s), (0, 2 * s)])
 
 
+def slotted_bore(radius, half, top):
+    """The loop of a bore with a slot for a key, clockwise: arcs of less than a third of a turn, and three sides."""
+    begin = np.arcsin(half / radius)
+    angles = np.pi / 2 - begin - np.linspace(0.0, 2.0 * np.pi - 2.0 * begin, 5)
+    arcs = []
+    for a, b in zip(angles[:-1], angles[1:], strict=True):
+        weight = np.cos((a - b) / 2)
+        middle = radius / weight * np.array([np.cos((a + b) / 2), np.sin((a + b) / 2)])
+        ends = [radius * np.array([np.cos(t), np.sin(t)]) for t in (a, b)]
+        arcs.append(asm.NurbsCurve([ends[0], middle, ends[1]], [0, 0, 0, 1, 1, 1], 2, [1, weight, 1]))
+    low = radius * np.cos(begin)
+    corners = [(-half, low), (-half, top), (half, top), (half, low)]
+    sides = [asm.NurbsCurve([p, q], [0, 0, 1, 1], 1) for p, q in zip(corners[:-1], corners[1:], strict=True)]
+    return [*arcs, *sides]
+
+
 FITS = {
     "plates": lambda off: (PLATE, PLATE, at(5, 3, 10 - off)),
     "a pin in its bore": lambda off: (PLATE, asm.shapes.solid_cylinder(4 + off, 40), at(0, 0, 4)),
@@ -52,6 +69,19 @@ FITS = {
     ),
     "a ball on a ring": lambda off: (asm.shapes.torus(5, 1.5), asm.shapes.sphere(5 + off), at(0, 0, ON_RING)),
     "a ring around a ball": lambda off: (asm.shapes.sphere(5 + off), asm.shapes.torus(5, 1.5), at(0, 0, ON_RING)),
+    "a ball on a hole": lambda off: (PLATE, asm.shapes.sphere(5 + off), at(0, 0, 8)),
+    "a ball under a hole": lambda off: (asm.shapes.sphere(5 + off), PLATE, at(0, 0, 8)),
+    "a ball on a turned hole": lambda off: (
+        turned_part([(4, -5), (30, -5), (30, 5), (8, 5), (4, 1)]),
+        asm.shapes.sphere(12 + off),
+        at(0, 0, 5 + 80**0.5),
+    ),
+    "a ball in its seat": lambda off: (plug()[0], asm.shapes.sphere(10 + off), at(0, 0, 20 - 10 * 3**0.5)),
+    "a hub with a slot on its shaft": lambda off: (
+        asm.shapes.extrusion([circle(25.0)], 30.0, [slotted_bore(12.0, 3.0, 15.0)]),
+        asm.shapes.solid_cylinder(12 + off, 60),
+        at(0, 0, 3),
+    ),
     "a plug in its seat": lambda off: (*plug(2.0 * off), at(0, 0, 0)),
     "a dovetail": lambda off: (*dovetail(2.0 * off), at(0, 0, 3)),
     "a block in a square hole": lambda off: (
@@ -191,6 +221,24 @@ def test_balls_beside_rings_are_judged():
             assert answer.bound <= distance + 1e-14
             told_of += 1
     assert told_of > 20
+
+
+def test_balls_on_holes_are_judged():
+    """Anywhere about a plate's hole, and in it: what is told is the distance, wherever the ball is not in the plate."""
+    rng, plate, told_of = np.random.default_rng(8), asm.shapes.plate(60, 40, 10, [(0, 0, 4.0)]), 0
+    for _ in range(200):
+        radius, place = rng.uniform(1.0, 6.0), rng.uniform((-4, -4, -12), (4, 4, 12))
+        beside, height = np.hypot(*place[:2]), abs(place[2])
+        distance = np.hypot(max(4.0 - beside, 0.0), max(height - 5.0, 0.0)) - radius
+        if beside > 4.0:
+            distance = height - 5.0 - radius
+        answer = told(plate, asm.shapes.sphere(radius), np.r_[place, 1.0, 0.0, 0.0, 0.0])
+        assert (answer is not None) == (distance > -TOUCHING), (radius, place)
+        if answer is not None:
+            # What is told of bodies that are far apart is a bound.
+            assert answer.bound <= distance + 1e-12
+            told_of += 1
+    assert told_of > 50
 
 
 def test_of_a_scene_all_pairs_or_none():
