@@ -250,7 +250,7 @@ class PackedContents(Contents):
             # Faces may have other radii.
             self._lower_pairs = None
         if isinstance(q0, Solution):
-            packed = q0._ended[0]
+            packed = q0._ended.packed
             if packed is self._packed or (self._packed is not None and is_same_scene(packed, self._packed)):
                 return
             kept = self._packings.items()
@@ -356,14 +356,14 @@ class PackedContents(Contents):
         return handed_over(earlier, packed, solution._ended.state)
 
     def _state_of(self, name: str, packed: Packed, solution: Solution) -> Array:
-        earlier, state = solution._ended
-        if earlier is packed:
-            return state
-        if is_earlier(earlier, packed):
-            return taken_over(earlier, packed, state)
+        ended = solution._ended
+        if ended.packed is packed:
+            return ended.state
+        if is_earlier(ended.packed, packed):
+            return taken_over(ended.packed, packed, ended.state)
         theirs = _told(solution._scene.bodies, solution._scene.constraints)
-        if theirs == _told(self._bodies, self._seated_constraints()) and is_alike(earlier, packed):
-            return adopted(earlier, packed, state)
+        if theirs == _told(self._bodies, self._seated_constraints()) and is_alike(ended.packed, packed):
+            return adopted(ended.packed, packed, ended.state)
         raise InputError(
             f"{name} is a solution of another assembly, or of this one before a change; expected its own, "
             "or one of a scene with the same bodies and constraints by name"

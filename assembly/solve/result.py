@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,18 @@ if TYPE_CHECKING:
 __all__ = ["Ended", "Iteration", "Result"]
 
 Array = NDArray[np.float64]
-# A packed scene, and the state of the loop that a solve of it ended with. A named tuple takes five times as long.
-Ended = tuple[Packed, Array]
 # A constraint that is off by less than this part of the worst is not one of those that disagree.
 IDLE = 1e-3
-_new = object.__new__
+_new, _new_tuple = object.__new__, tuple.__new__
 # To read a member of an enumeration takes as long as to set five attributes.
 _SOLVED = Status.SOLVED
+
+
+class Ended(NamedTuple):
+    """A packed scene, and the state of the loop that a solve of it ended with."""
+
+    packed: Packed
+    state: Array
 
 
 class Iteration(tuple[float, ...]):
@@ -82,7 +87,8 @@ class Result(ReadOnlyArrays):
         fit: Fit | None = None,
     ) -> None:
         self._scene = scene
-        self._ended: Ended = packed, state
+        # As `Ended(packed, state)`, which goes through a function of Python's.
+        self._ended = _new_tuple(Ended, (packed, state))
         # As bytes where they were read from the memory of a solve, which takes half the time of an array.
         self._figures = history
         self.status = status
@@ -105,7 +111,7 @@ class Result(ReadOnlyArrays):
             return cls(scene, packed, state, Status.SOLVED, seconds, history)
         self = _new(cls)
         self._scene = scene
-        self._ended = packed, state
+        self._ended = _new_tuple(Ended, (packed, state))
         self._figures = history
         self.status = _SOLVED
         self.seconds = seconds
@@ -115,7 +121,7 @@ class Result(ReadOnlyArrays):
     @property
     def _turn(self) -> Turn:
         """That of its scene, whose packing it shares."""
-        return self._ended[0].turn
+        return self._ended.packed.turn
 
     def _list_contacts(self) -> None:
         """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""
@@ -131,13 +137,13 @@ class Result(ReadOnlyArrays):
     def _packed(self) -> Packed:
         if self._lists is not None:
             self._list_contacts()
-        return self._ended[0]
+        return self._ended.packed
 
     @property
     def _state(self) -> Array:
         if self._lists is not None:
             self._list_contacts()
-        return self._ended[1]
+        return self._ended.state
 
     @cached_property
     def q(self) -> Array:

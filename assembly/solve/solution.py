@@ -100,7 +100,7 @@ class Solution(Result):
         """Value of the objective, in the user's units."""
         value = self._result(OBJECTIVE)
         if np.isfinite(value) or not self._is_lost:
-            return value * self._ended[0].unit
+            return value * self._ended.packed.unit
         return self._goal[0]
 
     @property

@@ -218,9 +218,9 @@ def rests_again(
     be clear.
     """
     packed, rest = scene.packed(), last._rest
-    if isinstance(rest, Pressed) and last.success and last._ended[0] is packed:
+    if isinstance(rest, Pressed) and last.success and last._ended.packed is packed:
         return resting_start(scene, last.q.copy(), settings, starts, interruption)
-    if not isinstance(rest, Rest) or not last.success or last._ended[0] is not packed or not _is_possible(scene):
+    if not isinstance(rest, Rest) or not last.success or last._ended.packed is not packed or not _is_possible(scene):
         return None
     begin = perf_counter()
     there = rest.inner._solved(settings, rest.there, starts, interruption)

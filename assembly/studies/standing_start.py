@@ -60,7 +60,7 @@ def standing_start(
     packed = scene.packed()
     if not can_prove(packed) or not is_for_proofs(packed) or scene._scene is None:
         return None
-    if isinstance(q0, Solution) and q0._ended[0] is not packed:
+    if isinstance(q0, Solution) and q0._ended.packed is not packed:
         return None
     start = partial(scene._start, packed, q0, starts)
     load(packed, start)
@@ -89,14 +89,14 @@ def with_contacts(scene: Assembly, solution: Result) -> Ended:
     """
     ended = solution._ended
     settings = CTRL_C.settings(CTRL_C.fill(Options(touching=solution._touching).settings()))
-    packed = scene._packed_as(ended[0]) or ended[0]
+    packed = scene._packed_as(ended.packed) or ended.packed
     grows = packed.crowding < MOST_CROWDING
     while True:
         settings[PLACES] = float(grows)
         outcome = with_listed(packed.as_asked(solution._asked), CTRL_C, settings, _start_of(packed, ended))
         CTRL_C.is_over()
         if not (grows and packed.is_crowded(outcome.state)):
-            return packed, _same_results(packed, outcome.state, ended)
+            return Ended(packed, _same_results(packed, outcome.state, ended))
         more = _with_more_places(scene, packed, solution)
         grows = more is not None and more.crowding < MOST_CROWDING
         packed = more or packed

@@ -87,7 +87,7 @@ def swept_solve(
         raise InputError(f"q0 is {type(start).__name__!r} with swept=True; expected a Solution, where the way begins")
     start._list_contacts()
     packed = scene.packed()
-    if not is_same_scene(start._ended[0], packed):
+    if not is_same_scene(start._ended.packed, packed):
         # What its way begins with, proofs and what was asked for, is of that scene.
         raise InputError("q0 is a solution of another assembly with swept=True, or before a change; expected its own")
     if not (start.success or start.way is not None):

@@ -81,6 +81,5 @@ def begun_states(
 
 def _begun(scene: Assembly, packed: Packed, start: Solution) -> Array:
     """The state that a solve from a solution begins with, but for the turns of driven angles."""
-    earlier, state = start._ended
-    own = earlier is packed and not packed._turned.coupled
-    return state if own else scene._start(packed, start, None)
+    own = start._ended.packed is packed and not packed._turned.coupled
+    return start._ended.state if own else scene._start(packed, start, None)

@@ -203,7 +203,7 @@ class Chain:
 
     def _moves_little(self, last: Solution, solution: Solution) -> bool:
         """Whether no body is far from where it was, where rows come and go, and steps say little for it."""
-        packed = last._ended[0]
+        packed = last._ended.packed
         if not (packed.one_sided.any() or packed.contacts):
             return False
         return bool(np.abs(moves(last.q, solution.q, packed.scale)).max() <= STILL)

@@ -21,6 +21,7 @@ from assembly.solve.attempts.attempts import go_on_once
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.parameters import CHORD_SHIFT
 from assembly.solve.loop.settings import GATHER, GATHERS, SCATTER
+from assembly.solve.result import Ended
 from benchmarks import linkages, scenes
 from benchmarks.running import example
 
@@ -86,7 +87,7 @@ def _without(solution):
     """The same solution without what is kept with it."""
     other = deepcopy(solution)
     # The copy has a packed scene of its own: it is put beside the one of the scene again.
-    other._ended, other._scene = (solution._packed, solution._state.copy()), solution._scene
+    other._ended, other._scene = Ended(solution._packed, solution._state.copy()), solution._scene
     other._state[solution._packed.kept_at :] = 0.0
     return other
 
