@@ -39,7 +39,12 @@ def mechanisms(count: Count) -> None:
     first = count("four-bar, cold", scene.solve)
     assert crank.angle is not None
     crank.angle += math.radians(1.0)
-    count("four-bar, a warm step of 1 degree", partial(scene.solve, first))
+    second = count("four-bar, a warm step of 1 degree", partial(scene.solve, first))
+    for _ in range(8):
+        crank.angle += math.radians(1.0)
+        second = scene.solve(second)
+    crank.angle += math.radians(1.0)
+    count("four-bar, a step of 1 degree on its way", partial(scene.solve, second))
     count("Bricard's ring", linkages.bricard(1.0).solve)
     count("Bennett's linkage, mobility", linkages.bennett(1.0).mobility)
     count("eight boxes, scattered", linkages.boxes(8, 0).solve)
@@ -64,7 +69,12 @@ def clips(count: Count) -> None:
     count("paper clips, contacts given", partial(scene.solve, starts=starts))
     begin = np.asarray(grip.target)
     grip.target = begin + (0.06, -0.04, 0.05)
-    count("paper clips, a warm step", partial(scene.solve, first))
+    second = count("paper clips, a warm step", partial(scene.solve, first))
+    for k in range(7):
+        grip.target = begin + np.array((0.06, -0.04, 0.05)) * (k % 2)
+        second = scene.solve(second)
+    grip.target = begin + (0.06, -0.04, 0.05)
+    count("paper clips, a step back on its way", partial(scene.solve, second))
     tracker = asm.Tracker(scene, grip.point, q0=first)
 
     def ticks() -> list[Any]:
@@ -147,11 +157,13 @@ FAMILIES = (mechanisms, clips, rings, solids, distances)
 # Cases whose instructions are counted: what a program does over and over again. Callgrind takes long to begin with one.
 BY_INSTRUCTION = (
     "four-bar, a warm step of 1 degree",
+    "four-bar, a step of 1 degree on its way",
     "eight boxes, scattered",
     "gear train, a warm step",
     "arm, target out of reach",
     "paper clips, contacts given",
     "paper clips, a warm step",
+    "paper clips, a step back on its way",
     "paper clips, 10 ticks",
     "three rings, a warm step",
     "two rings kept apart, 5 ticks",

@@ -35,6 +35,8 @@ KEPT_HEADER = record_dtype(
     has_rows=1,  # 1: rows and their derivatives
     version=1,  # of the pool
     factor=1,  # NO_FACTOR, or which solve made it
+    corrected=1,  # 1: with the factor is what corrected the tangent step of the solve that ended here
+    ratio=1,  # of that tangent step to the one before; 0: it was not corrected as that was
 )
 kept_header_at = record_view(KEPT_HEADER)
 HEADER = size_of(KEPT_HEADER)
@@ -46,11 +48,16 @@ NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
 # `values`, `residual`, `weights`: of every row the value that it subtracts, its residual, and its weight in the factor
 # (0: it did not count). `numbers`: of every contact its clearance number. At these poses: the records of `contacts`,
 # `joints` and vector `trims`, and the `jacobian` without the columns of lifted pairs. At these poses or others close
-# by: `factor`, the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it.
+# by: `factor`, the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it,
+# without those columns as well.
+# `course`: of the solve that ended here, in chord steps.
 Kept = namedtuple(
     "Kept",
-    "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor",
+    "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor course",
 )
+# `tangent`: the first step of a solve. `correction`: the sum of what came to it, and `forces`: of the changes of
+# multipliers that came with that, of every row. `before`, `forces_before`: such sums of the solve before, to scale.
+Course = namedtuple("Course", "tangent correction before forces forces_before")
 
 
 @kernel(inline=True)
@@ -59,8 +66,8 @@ def kept_size(table):
     header = header_at(table, 0)
     n, columns = kept_unknowns(table), FREE_COLUMN + 6 * header.extra
     records = (header.contacts + header.vector_trims) * CONTACT_RECORD + header.joints * JOINT_FRAMES
-    by_row = header.rows * (3 + columns + EXTRA_COLUMN + 6 * header.extra)
-    return HEADER + 7 * header.bodies + header.tracked + by_row + records + n * (n + 1) // 2
+    by_row = header.rows * (5 + 2 * columns)
+    return HEADER + 7 * header.bodies + header.tracked + by_row + records + n * (n + 1) // 2 + 3 * n
 
 
 @kernel(inline=True)
@@ -80,7 +87,8 @@ def has_place(table, state):
 @kernel(inline=True)
 def forget_factor(table, state):
     """Drop the factor that is kept in a state, which must have a place for one."""
-    kept_header_at(state, header_at(table, 0).kept).factor = NO_FACTOR
+    left = kept_header_at(state, header_at(table, 0).kept)
+    left.factor, left.corrected = NO_FACTOR, 0.0
 
 
 @kernel(inline=True)
@@ -106,9 +114,12 @@ def kept_in(table, state):
     at += header.vector_trims * CONTACT_RECORD
     jacobian = carve(state, at, (rows, columns))
     at += rows * columns
-    factor_jacobian = carve(state, at, (rows, EXTRA_COLUMN + 6 * header.extra))
-    at += rows * (EXTRA_COLUMN + 6 * header.extra)
+    factor_jacobian = carve(state, at, (rows, columns))
+    at += rows * columns
     factor = carve(state, at, (n * (n + 1) // 2,))
+    at += n * (n + 1) // 2
+    steps, forces = carve(state, at, (3, n)), carve(state, at + 3 * n, (2, rows))
+    course = Course(steps[0], steps[1], steps[2], forces[0], forces[1])
     return Kept(
         header.kept,
         poses,
@@ -123,6 +134,7 @@ def kept_in(table, state):
         jacobian,
         factor_jacobian,
         factor,
+        course,
     )
 
 
@@ -231,7 +243,7 @@ def put_factor(factor, ends, jacobian, kept):
         for j in range(i, factor.shape[0]):
             kept.factor[at] = factor[i, j] if j <= ends[i] else 0.0
             at += 1
-    keep_array(0, jacobian, kept.factor_jacobian)
+    keep_jacobian(jacobian, kept.factor_jacobian)
 
 
 @kernel(inner=True)

@@ -5,10 +5,11 @@ With A and W the Jacobian and the weights (1 / mu) of the active rows at the pos
     (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
 
 is a step of the whole system of `augmented_lagrangian.py` with an older matrix (the chord method); the first one is the
-tangent predictor for changed values and targets. If one more step would not reach the tolerances, the matrix is
-factorized anew, once. The iterate that reaches them is passed to the loop, which judges it as any other. If steps gain
-too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no
-step had been taken.
+tangent predictor for changed values and targets. In a solve that goes the way of the last one, or back, it is corrected
+by what corrected that one (`course.py`). The matrix is factorized anew, once, after a corrected step, or where one more
+step would not reach the tolerances. The iterate that reaches them is passed to the loop, which judges it as any other.
+If steps gain too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the
+solve as if no step had been taken.
 """
 
 from __future__ import annotations
@@ -34,14 +35,23 @@ from assembly.solve.linear_algebra.factorize import solve_step
 from assembly.solve.loop.begin import read_state
 from assembly.solve.loop.clearances import allowed_share, ends_unseen, update_again
 from assembly.solve.loop.contacts import is_near_fold
+from assembly.solve.loop.course import add_correction, follow_course
 from assembly.solve.loop.deadline import is_cut
-from assembly.solve.loop.keep import keep_factor, test_convexity
+from assembly.solve.loop.keep import add_kept_transposed, keep_factor, kept_times, test_convexity
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import dual_residual
-from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW_STEPS, LIFT_BELOW
+from assembly.solve.loop.parameters import (
+    CHORD_GAIN,
+    CHORD_LONGEST,
+    CHORD_SHIFT,
+    CHORD_STEPS,
+    CORRECTED_PENALTY,
+    FEW_STEPS,
+    LIFT_BELOW,
+)
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
-from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
+from assembly.solve.loop.residuals import move, violation_of
 from assembly.solve.loop.settings import RUNNING
 from assembly.solve.loop.terminate import keep_what_holds
 
@@ -52,17 +62,19 @@ Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_du
 
 @kernel(inner=True)
 def chord_step(shape, kept, point, rows, system):
-    """Compute the step by the kept factor from the Lagrangian's gradient, which `dual_residual` left in `descent`.
-
-    Returns the step's largest component.
-    """
+    """Compute the step by the kept factor from the Lagrangian's gradient, which `dual_residual` left in `descent`."""
     slope, step = system.directions.descent, system.directions.step
     for i in range(step.size):
         step[i] = -slope[i]
     for r in range(rows.count):
         rows.forces[r] = -point.residual[r] * kept.weights[r]
-    add_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, step)
+    add_kept_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, step)
     solve_step(system.factor, step.size, shape.sparsity, step)
+
+
+@kernel(inner=True)
+def largest_component(step):
+    """The largest component of a step; one that is not finite is the largest."""
     longest = 0.0
     for i in range(step.size):
         if not abs(step[i]) <= longest:
@@ -93,14 +105,14 @@ def write_told(table, told, state):
 
 
 @kernel(inner=True)
-def weigh_as_kept(kept, one_sided, rows):
-    """Make the rows active that are active in the kept factor. Whether none of these pulls.
+def weigh_as_kept(kept, one_sided, penalty, rows):
+    """Make the rows active that are active in the kept factor, with a penalty. Whether none of these pulls.
 
     A row that is not active may be violated on the way: it is part of the violation, and holds at the end.
     """
     for r in range(rows.count):
         counts = one_sided[r] == 0 or kept.weights[r] > 0.0
-        rows.active[r] = 1.0 / rows.mu if counts else 0.0
+        rows.active[r] = 1.0 / penalty if counts else 0.0
         if counts and one_sided[r] == 1 and rows.y[r] > 0.0:
             return False
     return True
@@ -138,24 +150,31 @@ def go_along(task, kept, iterates, rows, system, is_first):
     for k in range(header_at(store.table, 0).contacts):
         if is_near_fold(trial.records, k, LIFT_BELOW):
             return False
+    # Multipliers follow the step that was computed; a correction has multipliers of its own.
+    linear = kept.course.tangent if is_first and not task.tick else step
     for r in range(rows.count):
-        left = times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]
-        rows.y[r] += left * kept.weights[r]
+        rows.forces[r] = (
+            kept_times(shape.bases, kept.factor_jacobian, r, linear) + current.residual[r]
+        ) * kept.weights[r]
+        rows.y[r] += rows.forces[r]
+    if not task.tick:
+        follow_course(kept.course, rows, step, is_first)
     return True
 
 
 @kernel(inline=True)
-def wants_factor(task, count, arrived, violation, dual, last):
+def wants_factor(task, count, arrived, is_corrected, violation, dual, last):
     """Whether a factor is to be made at an iterate, in place of an earlier solve's.
 
     At the end of the steps the new factor is for the next solve; a tick that arrived soon keeps its old one. On the way
     a factor is made if one more step with the old one would not arrive. Newton's step leaves L e^2 / 2 of a distance e,
-    a chord step with the same matrix leaves L e of the remainder: twice the part that the step before has left.
+    a chord step with the same matrix leaves L e of the remainder: twice the part that the step before has left. What a
+    corrected step has left does not tell L.
     """
     if arrived:
         return not (task.tick and count <= FEW_STEPS)
     rate = 2.0 * max(violation, dual) / last
-    return not (rate * violation <= task.loop.feasible and rate * dual <= task.limits.stationarity)
+    return is_corrected or not (rate * violation <= task.loop.feasible and rate * dual <= task.limits.stationarity)
 
 
 @kernel(inner=True)
@@ -164,32 +183,45 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
     program, limits, feasible = task.program, task.limits, task.loop.feasible
     shape, stationarity = program.structure, limits.stationarity
     last_violation = last_dual = math.inf
-    swapped = False
+    swapped, ratio = False, 0.0
     failed = Chord(-1, False, math.inf, math.inf, math.inf, math.inf)
     limit = min(CHORD_STEPS, task.loop.longest_tick if task.tick else task.loop.limit)
     tests = not task.tick and header_at(program.store.table, 0).implicit == 0
+    penalty, left = rows.mu, kept_header_at(state, kept.header)
     for count in range(limit + 1):
         value = goal(program, rows.count, current, 1, system.gradient, system.hessian)
         violation = violation_of(current.residual, shape.one_sided, rows.count)
         dual = dual_residual(shape, current, rows, system, rows.y)
         log(history, count, (value, violation, dual, rows.mu, CHORD_SHIFT, 1.0, limits.radius))
-        if not (math.isfinite(value) and weigh_as_kept(kept, shape.one_sided, rows)):
+        if not (math.isfinite(value) and weigh_as_kept(kept, shape.one_sided, penalty, rows)):
             return failed
         # A tick ends after its steps at any pose at which rows hold.
         arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
+        # A corrected step may happen to end within the tolerances. Only a computed one leaves as little as ever.
+        is_corrected = count == 1 and ratio != 0.0
+        arrived = arrived and not is_corrected
         last = max(last_violation, last_dual)
         if not (arrived or max(violation, dual) <= CHORD_GAIN * last):
             return failed
-        is_old = count > 0 and kept_header_at(state, kept.header).factor == EARLIER_FACTOR
-        if is_old and wants_factor(task, count, arrived, violation, dual, last):
+        is_old = count > 0 and left.factor == EARLIER_FACTOR
+        if is_old and wants_factor(task, count, arrived, is_corrected, violation, dual, last):
             if not keep_factor(program, state, kept, current, rows, system):
                 return failed
             if tests:
                 test_convexity(task, rows, system, dual)
                 take_factor(kept, system.factor)
         if arrived:
+            if count > 0 and not task.tick:
+                # A tangent that arrives alone is not corrected.
+                left.corrected, left.ratio = 1.0 if count > 1 else 0.0, ratio
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
-        if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
+        if count == limit:
+            return failed
+        chord_step(shape, kept, current, rows, system)
+        if count == 0 and not task.tick:
+            ratio = add_correction(kept, shape, left, rows, system)
+            penalty = min(rows.mu, CORRECTED_PENALTY) if ratio != 0.0 else rows.mu
+        if not largest_component(system.directions.step) <= CHORD_LONGEST:
             return failed
         if not go_along(task, kept, (current, trial), rows, system, count == 0):
             return failed

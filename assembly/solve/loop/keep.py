@@ -23,6 +23,31 @@ from assembly.solve.loop.workspace import penalized
 
 
 @kernel(inner=True)
+def kept_times(bases, jacobian, r, d):
+    """Row r of J d with a Jacobian that is kept, which has no columns of lifted pairs (`residuals.times`)."""
+    s = 0.0
+    for b in range(bases.shape[1]):
+        at = bases[r, b] if b != 2 else -1
+        column = 6 * b if b < 2 else 6 * (b - 1)
+        if at >= 0:
+            for k in range(6):
+                s += jacobian[r, column + k] * d[at + k]
+    return s
+
+
+@kernel(inner=True)
+def add_kept_transposed(bases, jacobian, rows, weights, out):
+    """out += J^T weights with a Jacobian that is kept."""
+    for r in range(rows):
+        for b in range(bases.shape[1]):
+            at = bases[r, b] if b != 2 else -1
+            column = 6 * b if b < 2 else 6 * (b - 1)
+            if at >= 0 and weights[r] != 0.0:
+                for k in range(6):
+                    out[at + k] += weights[r] * jacobian[r, column + k]
+
+
+@kernel(inner=True)
 def keep_factor(program, state, kept, point, rows, system):
     """Factorize the matrix of a step at a point, in the system, and keep the factor. Returns whether there is one.
 
@@ -66,6 +91,7 @@ def leave(program, limits, state, point, rows, system, is_kept, is_solved):
     if not is_solved or kept.factor.shape[0] == 0:
         header.factor = NO_FACTOR
     elif header.factor == NO_FACTOR:
+        header.corrected = 0.0
         rows = penalized(rows, limits.penalty_floor)
         goal(program, rows.count, point, 1, system.gradient, system.hessian)
         weigh_rows(rows, program.structure.one_sided, point.residual)

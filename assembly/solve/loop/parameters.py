@@ -83,9 +83,17 @@ CHORD_STEPS, CHORD_GAIN = 6, 0.25
 FEW_STEPS = 2
 # [length, radian] The largest component of such a step. Doubled: longer moves are tried, in vain. Chosen.
 CHORD_LONGEST = 0.2
+# A first step that leads aside by at most ASIDE of itself, and is at most FARTHER times as long as the last solve's, is
+# corrected as that was. Doubled: worse corrections count, which cost a step; rounding is enlarged by the square. From:
+# at a quarter, half of what is of second order may be left.
+ASIDE, FARTHER = 0.25, 10.0
 # The shift of the Hessian in such a factor. Doubled: what is left after a step doubles. From: halves of what a step
 # leaves anyway, for moves of a hundredth.
 CHORD_SHIFT = 1e-5
+# The penalty in a factor that is made after such a step. Doubled: what the next step, the last one, leaves of the rows
+# doubles. From: that step changes multipliers by up to 1e-6, and is to leave rounding; rounding, times its inverse, is
+# 1e-8.
+CORRECTED_PENALTY = 1e-8
 
 # Multipliers. --------------------------------------------------------------------------------------------------------
 # [force] Multipliers below this count for nothing against the objective's curvature, which is of order one. Doubled:
