@@ -41,6 +41,7 @@ from assembly.solve.loop.keep import add_kept_transposed, keep_factor, kept_time
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import dual_residual
 from assembly.solve.loop.parameters import (
+    AFTER_CORRECTED,
     CHORD_GAIN,
     CHORD_LONGEST,
     CHORD_SHIFT,
@@ -197,9 +198,10 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
             return failed
         # A tick ends after its steps at any pose at which rows hold.
         arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
-        # A corrected step may happen to end within the tolerances. Only a computed one leaves as little as ever.
+        # A corrected step may happen to end within the tolerances. Only computed ones leave as little as ever.
         is_corrected = count == 1 and ratio != 0.0
-        arrived = arrived and not is_corrected
+        leaves_much = count == 2 and ratio != 0.0 and violation > AFTER_CORRECTED * feasible
+        arrived = arrived and not is_corrected and not leaves_much
         last = max(last_violation, last_dual)
         if not (arrived or max(violation, dual) <= CHORD_GAIN * last):
             return failed
