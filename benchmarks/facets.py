@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.geometry.faces.face import Face
 from assembly.proximity import FeatureStatus, closest_features
+from assembly.proximity.bvh.box_descent import tree_distance
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.packing import pack_tree
-from assembly.proximity.bvh.tree import tree_distance
 from benchmarks.figures import figure
 from benchmarks.kernels import facing_bodies
 

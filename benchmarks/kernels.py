@@ -20,7 +20,8 @@ from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.bvh.tree import pairs_within
 from assembly.proximity.clearance.pair_looks import ON_WAY
-from assembly.proximity.extrema.face_face import pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import solve_pair
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feature_query import feature_derivatives
 from assembly.proximity.extrema.pair_matrix import pair_matrix

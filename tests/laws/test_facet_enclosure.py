@@ -18,10 +18,11 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity import FeatureStatus, PairStatus, closest_features, extremal_pair
+from assembly.proximity.bvh.box_descent import least_distance, tree_distance
 from assembly.proximity.bvh.facet_check import edge_point, other_parameter
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.packing import pack_tree
-from assembly.proximity.bvh.tree import facing_pairs, least_distance, pairs_within, tree_at, tree_distance
+from assembly.proximity.bvh.tree import facing_pairs, pairs_within, tree_at
 from tests.geometry.splines.test_surface import random_surface
 
 CLIP = (Face(shapes.paper_clip()),)

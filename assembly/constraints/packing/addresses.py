@@ -10,8 +10,9 @@ from assembly.constraints.program.contact import contact_rows
 from assembly.constraints.program.lifted_contact import free_row, free_terms
 from assembly.constraints.program.place import place_terms
 from assembly.constraints.program.tapes import run_scene_tape
-from assembly.constraints.program.trim import trim_rows, trim_terms
+from assembly.constraints.program.trim import trim_rows
 from assembly.constraints.program.trim_corners import trim_sides
+from assembly.constraints.program.trim_hessian import trim_terms
 from assembly.proximity.extrema.global_start import start_surfaces
 from assembly.proximity.extrema.lifted_pair import coordinate_lengths, has_stayed, is_extremal
 from assembly.proximity.features.nearest_query import find_deepest, find_nearest

@@ -18,7 +18,8 @@ from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.splines.pole import limits, nearest_pole, polar_step
 from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extrema.face_face import CONVERGED, LAST_TURN, LEFT_PATCH, SINGULAR, own_frame, solve_pair
+from assembly.proximity.extrema.face_face import CONVERGED, LAST_TURN, LEFT_PATCH, SINGULAR, solve_pair
+from assembly.proximity.extrema.face_frames import own_frame
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row
 from assembly.proximity.features.solid_contact import (

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly.constraints.program.coordinate_hessian import add_coordinate_hessian
 from assembly.constraints.program.hessian_blocks import add_patch, block_row, clear_patch, is_blocked
-from assembly.constraints.program.primitives import add_coordinate_hessian
 from assembly.constraints.program.records import (
     COORDINATE,
     EXTRA_COLUMN,

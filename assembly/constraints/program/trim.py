@@ -14,23 +14,19 @@ to be. Off the loop the vector u - c = s n has two independent rates, n s_q and 
 along the loop, which is allowed, with a multiplier that grows toward the loop. So the first two forms use their signed
 length, one row that is zero where the vector is. The third contains the gap and has no such sign.
 With a loop that has corners, a row belongs to one of the loop's sides (`trim_sides.py`).
-The loop of a solve calls `trim_rows` and `trim_terms` by their addresses.
+The loop of a solve calls `trim_rows`, and `trim_terms` (`trim_hessian.py`), by their addresses.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.constraints.program.contact import contact_of, surface_of
 from assembly.constraints.program.place import (
     OwnPlace,
-    add_coordinate_curvature,
     add_place_rates,
-    place_at,
     place_error,
 )
 from assembly.constraints.program.records import (
@@ -47,8 +43,7 @@ from assembly.constraints.program.records import (
     jacobian_row_at,
     trim_row_at,
 )
-from assembly.constraints.program.row_terms import add_gram
-from assembly.constraints.program.trim_sides import OPEN, part_of, trim_place
+from assembly.constraints.program.trim_sides import OPEN, trim_place
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import curve_point, surface_point
@@ -360,53 +355,4 @@ def trim_rows(scene, pairs, at):
         else:
             vector_rows(store, r, lifted, point)
         r += row.count
-    return 0
-
-
-@kernel(
-    signatures=(
-        "(Tuple((i8[::1], f8[::1])), i8, "
-        "Tuple((i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[::1])), "
-        "i8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])), f8, f8[:, ::1])"
-    ),
-    allocates=True,
-)
-def trim_terms(scene, r, pairs, bases, point, y, hessian):
-    """Upper triangle of hessian += y (second derivative of row r).
-
-    It is exact for a place and for a signed row of a lifted pair; else the term of the change of u_q is left out. The
-    row of a vector is treated as the signed distance times the part that its gradient has of the distance's gradient:
-    at a solution the rest of it is a multiple of the gap's gradient.
-    """
-    table, pool = scene
-    free, lengths, vectors, variables, guess, memory = pairs
-    q, tracked, records, residual, jacobian = point
-    lifted = LiftedPairs(free, lengths, vectors, variables, guess, memory)
-    row = trim_of(table, r)
-    k = row.contact
-    o = 2 * row.side
-    if row.form == AT_PLACE:
-        stretch = place_at(pool, row.factor).stretch
-        slopes = (y * stretch[2 * row.slot], y * stretch[2 * row.slot + 1])
-        own, here = OwnPlace(row.factor, k, row.side), Iterate(q, tracked, records, residual, jacobian)
-        add_coordinate_curvature(Store(table, pool), own, slopes, lifted, bases, here, hessian)
-        return 0
-    place = trim_place(Store(table, pool), row, tracked)
-    if place.loop < 0:
-        return 0
-    _s, n, bend = trim_distance(Store(table, pool), place.loop, tracked[k, o], tracked[k, o + 1])
-    places = np.empty((1, bases.shape[1]), np.int64)
-    for b in range(bases.shape[1]):
-        places[0, b] = bases[r, b]
-    rates = np.zeros((1, jacobian.shape[1]))
-    factor = place.factor
-    if row.form != SIGNED:
-        add_coordinate_rate(lifted, records, k, o, n[0], rates, 0)
-        add_coordinate_rate(lifted, records, k, o + 1, n[1], rates, 0)
-        factor = part_of(jacobian, r, rates, k)
-        clear(rates, 0)
-    # s_uu = bend t t^T, t along the loop.
-    add_coordinate_rate(lifted, records, k, o, -n[1], rates, 0)
-    add_coordinate_rate(lifted, records, k, o + 1, n[0], rates, 0)
-    add_gram(places, rates, 0, y * factor * bend, hessian)
     return 0

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.errors import InputError, integer, positive, real_array, vector
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.controllers.control import Form, Side, form_number, surface_of
-from assembly.proximity.controllers.laws import NEWTON, NEWTON_SATURATED, SWITCHING, attraction
+from assembly.proximity.controllers.runs import NEWTON, NEWTON_SATURATED, SWITCHING, attraction
 
 __all__ = [
     "GainBounds",

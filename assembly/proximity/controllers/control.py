@@ -21,17 +21,8 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.frame import Point
 from assembly.kinematics.pose import IDENTITY_ROW, check_quaternion
-from assembly.proximity.controllers.laws import (
-    DISTANCE,
-    ERROR,
-    GAIN,
-    MODE_F,
-    MODE_G,
-    ROW,
-    ControlEnd,
-    ControlLaw,
-    run_control,
-)
+from assembly.proximity.controllers.laws import DISTANCE, ERROR, GAIN, MODE_F, MODE_G, ROW, ControlLaw
+from assembly.proximity.controllers.runs import ControlEnd, run_control
 
 __all__ = ["ControlRun", "ControlStatus", "Controller"]
 

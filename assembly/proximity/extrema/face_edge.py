@@ -27,9 +27,9 @@ from assembly.proximity.extrema.face_face import (
     SINGULAR,
     advance,
     bent_at_most,
-    own_frame,
     stagnates,
 )
+from assembly.proximity.extrema.face_frames import own_frame
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,

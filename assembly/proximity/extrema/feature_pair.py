@@ -14,7 +14,8 @@ from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
-from assembly.proximity.extrema.face_face import LAST_TURN, LIMIT, pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import LAST_TURN, LIMIT, solve_pair
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.feature_jets import FeatureFrame, NewtonLimits, face_side
 from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, is_no_saddle, pair_matrix
 

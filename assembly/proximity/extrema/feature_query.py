@@ -11,7 +11,8 @@ from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, matvec, matvec_t
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.records import FACE, Feature
-from assembly.proximity.extrema.face_face import pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import solve_pair
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.feature_jets import offset_side
 from assembly.proximity.extrema.feature_pair import features_at, solve_features
 from assembly.proximity.extrema.feedback import descend_pair

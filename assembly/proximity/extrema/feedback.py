@@ -27,10 +27,9 @@ from assembly.proximity.extrema.face_face import (
     PairSolution,
     advance,
     bent_at_most,
-    own_frame,
-    pair_frame,
     solve_pair,
 )
+from assembly.proximity.extrema.face_frames import own_frame, pair_frame
 from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_matrix
 
 # Beside the statuses of `solve_pair`: the surfaces cross where the descent led.

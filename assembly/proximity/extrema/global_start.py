@@ -32,14 +32,8 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import IDENTITY, relative_pose, rotation
-from assembly.proximity.extrema.face_face import (
-    CONVERGED,
-    LEFT_PATCH,
-    NOT_CONVERGED,
-    SINGULAR,
-    own_frame,
-    solve_pair,
-)
+from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extrema.face_frames import own_frame
 
 # How many of the nearest and of the best aligned samples are tried.
 NEAREST = 16

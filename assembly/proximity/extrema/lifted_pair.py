@@ -22,7 +22,7 @@ from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_at, surface_point, third_derivatives
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
-from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.pair_matrix import VANISHING
 
 VARIABLES = 16

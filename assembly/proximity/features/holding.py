@@ -23,7 +23,8 @@ from assembly.proximity.brep.records import (
     edge_at,
     shell_at,
 )
-from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, SINGULAR, own_frame
+from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, SINGULAR
+from assembly.proximity.extrema.face_frames import own_frame
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.switching import between_edges, from_edge, from_vertex

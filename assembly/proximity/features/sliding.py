@@ -19,7 +19,7 @@ from assembly.proximity.brep.records import (
     face_at,
     shell_at,
 )
-from assembly.proximity.extrema.face_face import own_frame, pair_frame
+from assembly.proximity.extrema.face_frames import own_frame, pair_frame
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.extrema.pair_matrix import null_ways, pair_matrix
 

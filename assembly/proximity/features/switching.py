@@ -42,7 +42,8 @@ from assembly.proximity.brep.records import (
     shell_at,
     vertex_at,
 )
-from assembly.proximity.extrema.face_face import LEFT_PATCH, NOT_CONVERGED, own_frame
+from assembly.proximity.extrema.face_face import LEFT_PATCH, NOT_CONVERGED
+from assembly.proximity.extrema.face_frames import own_frame
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.sliding import slide_off
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, scale, sub
+from assembly.proximity.bvh.box_descent import box_distance
 from assembly.proximity.bvh.neighbor_list import LIST_INTS, ListKey, listed_pairs
-from assembly.proximity.bvh.tree import box_distance, node_of, pairs_within, seen_from, three_of, view_of
+from assembly.proximity.bvh.tree import node_of, pairs_within, seen_from, three_of, view_of
 from assembly.proximity.manager.parameters import CROWDED_PART, FEW, LEAST_MOTION_BOUND, SKIN, TAKE
 from assembly.proximity.manager.records import header_of, lengths_of, pair_lengths_of, record_of
 

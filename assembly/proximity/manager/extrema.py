@@ -22,7 +22,8 @@ from assembly.kinematics.motion import rotation
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
 from assembly.proximity.bvh.tree import three_of
-from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.global_start import opposed
 from assembly.proximity.extrema.pair_matrix import is_the_only_one

@@ -13,7 +13,8 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import blend
-from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame
+from assembly.proximity.extrema.face_face import bent_at_most, move_pair
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_matrix
 from assembly.proximity.manager.newton_regions import is_beside
 

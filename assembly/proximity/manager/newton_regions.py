@@ -11,7 +11,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import is_within
-from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
+from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_step
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.extrema.pair_matrix import FLAT, across_first, is_the_only_one, pair_matrix
 from assembly.proximity.extrema.projection import BESIDE
 from assembly.proximity.features.holding import POINT

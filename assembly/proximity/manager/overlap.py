@@ -18,17 +18,8 @@ from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import EDGE_RECORD, FACE_RECORD, edge_at, face_at, shell_at
-from assembly.proximity.bvh.tree import (
-    ELEMENT,
-    NODE,
-    NODE_INTS,
-    element_at,
-    node_at,
-    node_links_at,
-    overlapping,
-    three_of,
-    tree_at,
-)
+from assembly.proximity.bvh.box_descent import overlapping
+from assembly.proximity.bvh.tree import ELEMENT, NODE, NODE_INTS, element_at, node_at, node_links_at, three_of, tree_at
 from assembly.proximity.extrema.projection import BESIDE, projection_of
 from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contacts, pierces
 

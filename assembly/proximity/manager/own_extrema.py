@@ -16,7 +16,7 @@ from assembly.proximity.brep.borders import feature_at, feature_of
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.bvh.tree import TREE_ROUNDING, node_of, off_axis, seen_from, three_of, view_of
 from assembly.proximity.extrema.face_edge import NO_EDGE, edge_over, point_over, step_on_face
-from assembly.proximity.extrema.face_face import own_frame
+from assembly.proximity.extrema.face_frames import own_frame
 from assembly.proximity.extrema.feature_jets import NewtonLimits, edge_jet, other_jet
 from assembly.proximity.extrema.projection import BESIDE
 from assembly.proximity.manager.continua import kinds_of

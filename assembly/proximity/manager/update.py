@@ -19,8 +19,8 @@ import numpy as np
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._record import Store
+from assembly.proximity.bvh.box_descent import least_distance
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
-from assembly.proximity.bvh.tree import least_distance
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.proximity.manager.candidates import Candidates, candidate_pairs, near_enough
 from assembly.proximity.manager.centerlines.box import BOX

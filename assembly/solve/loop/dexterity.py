@@ -24,9 +24,10 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.constraints.program.coordinate_hessian import add_coordinate_hessian
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import DEXTERITY, TERM, term_at, three_at
-from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
+from assembly.constraints.program.primitives import coordinate
 from assembly.constraints.program.records import BODY_COORDINATE, Iterate, body_coordinate_at, header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.geometry.vec import add, cross, matvec

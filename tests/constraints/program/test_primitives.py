@@ -9,6 +9,7 @@ import pytest
 
 from assembly._kernel import kernel
 from assembly.constraints.program import primitives as P
+from assembly.constraints.program.coordinate_hessian import add_coordinate_hessian
 from assembly.kinematics import motion
 
 COORDINATES = [
@@ -89,7 +90,7 @@ def gradient(kind, component, records, k=1, near=0.0):
 def hessian(kind, component, records, k=1, y=1.0):
     """The whole symmetric matrix."""
     out = np.zeros((12, 12))
-    P.add_coordinate_hessian(kind, component, records, k, y, out, 0, 6)
+    add_coordinate_hessian(kind, component, records, k, y, out, 0, 6)
     return np.triu(out) + np.triu(out, 1).T
 
 
@@ -415,7 +416,7 @@ def test_hessians_are_added_where_they_belong(kind, component, f, g):
     records = placed(*scene(8))
     before = np.random.default_rng(9).normal(size=(18, 18))
     after = before.copy()
-    P.add_coordinate_hessian(kind, component, records, 1, -1.5, after, f, g)
+    add_coordinate_hessian(kind, component, records, 1, -1.5, after, f, g)
     full = -1.5 * hessian(kind, component, records)
     expected = np.zeros((18, 18))
     places = [(o, 6 * i) for i, o in enumerate((f, g)) if o >= 0]
@@ -440,7 +441,7 @@ def run(pool, q, kinds, components, near, records, values, jacobian, second, f, 
     for r in range(kinds.size):
         values[r], n, arm_f, arm_g, h = P.coordinate(kinds[r], components[r], records, 1, near)
         P.write_gradient(n, arm_f, arm_g, h, 1.0, jacobian, r, 0)
-        P.add_coordinate_hessian(kinds[r], components[r], records, 1, 1.0, second[r], f, g)
+        add_coordinate_hessian(kinds[r], components[r], records, 1, 1.0, second[r], f, g)
 
 
 @pytest.mark.parametrize("swing", [None, 0.0, 0.01, 3.0, math.pi])
@@ -462,7 +463,7 @@ def test_compiled_and_plain_python_agree(swing):
                 continue
             # Other roundings (fused multiply-add), and steep derivatives where z_b is near opposed.
             expected = np.zeros((12, 12))
-            P.add_coordinate_hessian(kind, component, plain, 1, 1.0, expected, f, g)
+            add_coordinate_hessian(kind, component, plain, 1, 1.0, expected, f, g)
             scale = 1.0 + np.abs(expected).max()
             assert values[r] == pytest.approx(value(kind, component, plain, near=8.0), rel=0, abs=1e-14 * scale)
             np.testing.assert_allclose(jacobian[r], gradient(kind, component, plain), rtol=0, atol=1e-14 * scale)

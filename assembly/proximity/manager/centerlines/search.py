@@ -17,7 +17,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import cross, dot, matvec_t, scale
-from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.face_frames import pair_frame
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.centerlines.box import (
     BARREN,
