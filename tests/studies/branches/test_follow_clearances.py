@@ -286,22 +286,31 @@ def test_a_plate_thinner_than_a_step_is_not_jumped_over():
     assert branch.values[0] == pytest.approx(0.0105, abs=1e-14)
 
 
-def test_what_touches_all_around_is_told_by_rows_and_proven():
+@pytest.mark.parametrize(
+    ("round_body", "height", "is_proved"),
+    [
+        (asm.shapes.sphere(0.5), 0.5, True),
+        # What the loop holds is told, and not proven of what is no elementary surface.
+        (asm.shapes.ellipsoid(0.5, 0.5, 0.6), 0.6, False),
+    ],
+    ids=["ball", "ellipsoid"],
+)
+def test_what_touches_all_around_is_told_by_rows(round_body, height, is_proved):
     """A ball on the rim of a hole: its middle is sqrt(0.5^2 - 0.35^2) above the rim then."""
     rail = asm.Body("rail", fixed=True)
     plate = asm.Body("plate", asm.shapes.plate(2, 2, 0.2, [(0, 0, 0.35)]), fixed=True)
-    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(0, 0, 1.0))
+    ball = asm.Body("ball", round_body, position=(0, 0, 1.0))
     drive = asm.Prismatic(rail.frame(), ball.frame(), "drive", slide=1.0)
     scene = asm.Assembly([rail, plate, ball])
     scene.constrain(drive, asm.Clearance())
     branch = asm.follow(scene, asm.Parameter(drive, "slide"), 0.0, 1.1)
     assert branch.ends == ("blocked", "end of range")
-    assert branch.values[0] == pytest.approx(0.1 + sqrt(0.5**2 - 0.35**2), abs=1e-12)
+    assert branch.values[0] == pytest.approx(0.1 + height * sqrt(1.0 - 0.7**2), abs=1e-12)
     assert hypot(*branch.events[0].place[:2]) == pytest.approx(0.35, abs=1e-12)
-    assert branch.proved.all()
+    assert branch.proved[0] == is_proved and branch.proved[1:].all()
     if find_spec("matplotlib"):
         labels = {text.get_text() for text in branch.plot().axes[0].get_legend().get_texts()}
-        assert labels == {"contact closed", "end of range", "not proved"}
+        assert labels == {"contact closed", "end of range"} | (set() if is_proved else {"not proved"})
 
 
 def test_a_ring_let_down_on_a_ball_meets_it_exactly_and_that_is_proven():
