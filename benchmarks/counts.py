@@ -41,7 +41,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
         "distance.batch.filter.is_apart",
         "proximity.features.global_search.node_bound",
         "proximity.bvh.tree.admits",
-        "proximity.bvh.tree.box_distance",
+        "proximity.bvh.box_descent.box_distance",
         "proximity.manager.centerlines.box.box_of",
         "proximity.manager.centerlines.parts.parts_apart",
     ),
