@@ -246,6 +246,9 @@ def test_a_ring_and_a_ball_are_apart_by_what_samples_say(ends):
         assert depth <= sampled + 1e-12 and sampled <= depth + 0.07
         inward, borders = made.planes(center)
         assert abs((inward @ center - borders).min() - depth) < 1e-12
+    # What the face may be off it is nearer by as much.
+    off = made._replace(off=0.01)
+    np.testing.assert_allclose(off.depth_of(surface), -0.01, rtol=0, atol=1e-12)
     # At its very profile a point is on no side of it.
     level = Ring(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(ends), 0.0)
     assert not len(level.planes(np.array([ends[0][1], 0.0, ends[0][0]]))[0])
