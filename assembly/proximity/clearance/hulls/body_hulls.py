@@ -11,7 +11,7 @@ that a cylinder, a cone, a ball or a torus is made of. It reaches no farther tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 from math import tan
@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
+from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube
+from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, ForBalls, Hollow
+from assembly.proximity.clearance.hulls.prism import Prism
 
 __all__ = ["BodyHulls", "hulls_of_body"]
 
@@ -52,7 +54,7 @@ class BodyHulls:
         What is not convex counts as several faces, one for each part: the number of the whole face.
     points, owner : (p, 3), (p,) of int
         Points that are on faces, corners among them, and the face of each.
-    hollows : tuple of (int, Hollow, Prism, Tube or Ring)
+    hollows : tuple of (int, AnyHollow)
         Sets into whose inside no point of a face goes, with the face.
     directions : (d, 3)
         Normals of flat faces and axes, up to their senses.
@@ -67,7 +69,7 @@ class BodyHulls:
     part_of: Table
     points: Array
     owner: Table
-    hollows: tuple[tuple[int, Hollow | Prism | Tube | Ring], ...]
+    hollows: tuple[tuple[int, AnyHollow], ...]
     directions: Array
     centers: Array
     axes: Array
@@ -77,13 +79,16 @@ class BodyHulls:
         rows = self.discs.reach(normals)
         return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
 
-    def within(self, hollow: Hollow | Prism | Tube | Ring) -> Array:
+    def within(self, hollow: AnyHollow) -> Array:
         """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
-        rows = hollow.depth(self.discs)
-        if isinstance(hollow, Tube | Ring):
-            # It is not convex: what is in it with all of its discs need not be.
-            rows[~self.is_ball] = -np.inf
-        return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
+        if isinstance(hollow, ForBalls):
+            rows = np.full((1, len(self.discs.radii)), -np.inf)
+            rows[0, self.is_ball] = hollow.depth_of(self.discs.centers[self.is_ball])
+        else:
+            # Of each side of a prism another one of a face's hulls may tell.
+            rows = hollow.depths(self.discs) if isinstance(hollow, Prism) else hollow.depth(self.discs)[None]
+        of_hulls = np.minimum.reduceat(rows, self.first, axis=1) - self.pad
+        return np.asarray(np.maximum.reduceat(of_hulls, self.of_face, axis=1).min(axis=0))
 
     def discs_of(self, face: int) -> Discs:
         """The discs and points of all hulls of a face."""
@@ -92,7 +97,7 @@ class BodyHulls:
         rows = slice(int(ends[self.of_face[face]]), int(ends[last]))
         return Discs(*(column[rows] for column in self.discs))
 
-    def nearest(self, hollow: Hollow | Prism | Tube | Ring, face: int) -> Array:
+    def nearest(self, hollow: AnyHollow, face: int) -> Array:
         """The middle of the disc of a face (3,) that is nearest to the border of a hollow around it."""
         ends = np.append(self.first, len(self.discs.radii))
         last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)
@@ -134,6 +139,14 @@ class BodyHulls:
             left * self.centers + shift,
             self.axes,
         )
+
+    def facing(self, other: BodyHulls) -> BodyHulls:
+        """What is of use beside another body: hollows for balls only where that has some."""
+        return self if other.is_ball.any() else self._without_balls
+
+    @cached_property
+    def _without_balls(self) -> BodyHulls:
+        return replace(self, hollows=tuple(own for own in self.hollows if not isinstance(own[1], ForBalls)))
 
     @cached_property
     def is_ball(self) -> NDArray[np.bool_]:

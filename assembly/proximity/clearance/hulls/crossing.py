@@ -20,7 +20,7 @@ from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
-from assembly.proximity.clearance.hulls.hollows import Ring, Tube
+from assembly.proximity.clearance.hulls.hollows import ForBalls
 
 __all__ = ["Marked", "crossing_by_hulls", "marked"]
 
@@ -141,7 +141,7 @@ def _depths(hulls: BodyHulls, points: Array, normals: Array, reach: Array) -> Ar
     along = (points @ normals.T)[:, None] - reach
     hollows: list[list[Array]] = [[] for _ in reach]
     for face, hollow in hulls.hollows:
-        if not isinstance(hollow, Tube | Ring):
+        if not isinstance(hollow, ForBalls):
             hollows[face].append(hollow.depth_of(points))
     columns = np.full((len(points), len(reach), max((len(own) for own in hollows), default=0)), -np.inf)
     for face, own in enumerate(hollows):

@@ -13,11 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Freeform, Plane, Sphere, Torus
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.flat_hulls import hole_of_ring, hulls_of_flat
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube, parts_of_one
+from assembly.proximity.clearance.hulls.hollows import FaceHulls, Hollow, Ring, Tube, parts_of_one
 from assembly.proximity.clearance.hulls.looped_part import looped_part
+from assembly.proximity.clearance.hulls.prism import Prism
+from assembly.proximity.clearance.hulls.turned import Turned, turned_surface
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 from assembly.proximity.manifolds.flat_map import FlatMap, flat_map
 
@@ -28,6 +31,8 @@ Array = NDArray[np.float64]
 SPANS = 16
 # All around, but for rounding; of less a hull of control points may be the smaller one.
 AROUND = 2.0 * pi - 1e-9
+# Of what goes around an axis less than half, others are beside it by planes.
+HALF = pi - 1e-9
 
 
 def hulls_of_face(face: Face) -> list[FaceHulls]:
@@ -46,7 +51,8 @@ def hulls_of_face(face: Face) -> list[FaceHulls]:
         return [FaceHulls([(Discs.of_points(net), 0.0)], hole_of_ring(surface, form.normal), points, form.normal, None)]
     part = looped_part(face)
     around, line = _of_form(form, part), _line_of(form)
-    hollows = [*_hollow(form, face), *_rings(form, face, around)]
+    turned = turned_surface(part) if _may_be_turned(form, face, part) else None
+    hollows = [*_hollow(form, face), *_rings(form, face, around), *_through(form, face, around, turned)]
     known = hollows, points, _axis_of(form), line
     if around is not None and _is_all_around(form):
         return [FaceHulls([around], hollows, points, _axis_of(form), line)]
@@ -55,8 +61,17 @@ def hulls_of_face(face: Face) -> list[FaceHulls]:
     if len(parts) > SPANS:
         parts = parts.reshape(1, -1, 4)
     others = [] if around is None else [around]
+    if turned is not None:
+        others.append((turned.discs, turned.off))
     nets = [net[:, :3] / net[:, 3:] for net in parts]
     return parts_of_one([FaceHulls([*others, (Discs.of_points(net), 0.0)], *known) for net in nets])
+
+
+def _may_be_turned(form: Form, face: Face, part: NurbsSurface) -> bool:
+    """Whether it may be worth asking which part of what goes around an axis a face is; of a cone its ends tell."""
+    if isinstance(form, Torus):
+        return form.turn.angle >= HALF and not all(part.closed)
+    return any(part.closed) and (isinstance(form, Freeform) or (isinstance(form, Sphere) and face.outer is not None))
 
 
 def _is_all_around(form: Form) -> bool:
@@ -81,8 +96,8 @@ def _of_form(form: Form, part: NurbsSurface) -> tuple[Discs, float] | None:
 def _hollow(form: Form, face: Face) -> list[Hollow | Prism | Tube]:
     """What is within a face's cylinder, cone or sphere, without what the face may be off it; what is beside a torus.
 
-    Of a whole torus that is the cylinder through it as well. Of the many parts of tori that round edges off only those
-    that go all around and are hollow have some, as races of balls.
+    Of the many parts of tori that round edges off only those that go all around and are hollow have some, as races of
+    balls.
     """
     sign = face.sign
     if isinstance(form, Sphere):
@@ -98,18 +113,35 @@ def _hollow(form: Form, face: Face) -> list[Hollow | Prism | Tube]:
             race = Tube(form.center, form.axis, form.major, inner, False, True)
             return [race] if any(face.surface.closed) else []
         if all(face.surface.closed) and face.outer is None:
-            through = Hollow(form.center, form.axis, form.major - outer)
-            return [through, Tube(form.center, form.axis, form.major, outer, True, True)]
+            return [Tube(form.center, form.axis, form.major, outer, True, True)]
     return []
 
 
 def _rings(form: Form, face: Face, around: tuple[Discs, float] | None) -> list[Ring]:
-    """The part of a hollow cylinder or cone between its ends, for balls that lie on these or on it."""
-    if around is None or not isinstance(form, (Cylinder, Cone)) or form.outward == (face.sign > 0):
+    """The part of a cylinder or cone between its ends, for balls that lie on these or on it, or beside it."""
+    if around is None or not isinstance(form, (Cylinder, Cone)):
         return []
     (first, last), radii = around[0].centers, around[0].radii
     ends = np.array([[0.0, radii[0]], [float((last - first) @ form.axis), radii[1]]])
-    return [Ring(first, form.axis, ends, around[1])]
+    return [Ring(first, form.axis, ends, around[1], is_wall=form.outward != (face.sign > 0))]
+
+
+def _through(form: Form, face: Face, around: tuple[Discs, float] | None, turned: Turned | None) -> list[Hollow]:
+    """The cylinder through what goes around an axis, as far from that as its narrowest place."""
+    line, least = _line_of(form), 0.0
+    if isinstance(form, Cone) and around is not None:
+        least = float(around[0].radii.min()) - form.deviation
+    elif isinstance(form, Torus) and form.turn.angle >= HALF:
+        least = form.major - form.minor - form.deviation
+    if turned is not None and turned.least > least:
+        line, least = (turned.center, turned.axis), turned.least
+    if line is None or not least > 0.0:
+        return []
+    is_within = isinstance(form, Sphere | Cone | Torus) and form.outward == (face.sign > 0)
+    if isinstance(form, Torus):
+        # On the side of the tube that is next to the axis a body in the tube is around the hole.
+        return [Hollow(*line, least, 0.0, is_within == (least < form.major))]
+    return [Hollow(*line, least, 0.0, isinstance(form, Sphere | Cone) and not is_within)]
 
 
 def _axis_of(form: Form) -> Array | None:

@@ -9,7 +9,11 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, parts_of_one
+from assembly.proximity.clearance.hulls.boundary_pieces import BoundaryPieces, boundary_pieces
+from assembly.proximity.clearance.hulls.discs import Discs
+from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, Hollow, Ring, parts_of_one
+from assembly.proximity.clearance.hulls.prism import Prism
+from assembly.proximity.clearance.hulls.sheet import Sheet
 from assembly.proximity.clearance.hulls.triangles import triangles_of
 from assembly.proximity.manifolds.flat_map import FlatMap
 
@@ -17,7 +21,7 @@ __all__ = ["hole_of_ring", "hulls_of_flat"]
 
 Array = NDArray[np.float64]
 # Of every curve of a boundary the circle that it is on, or None.
-Arcs = list[Circle | None]
+Boundary = list[Circle | None]
 # How far a corner of a polygon that counts as convex may be beyond its sides, in parts of the face's size.
 CONVEX = 1e-13
 # How near to a circle an arc of a boundary is, in parts of the face's size; it is added to or taken from its radius.
@@ -34,10 +38,14 @@ def hulls_of_flat(face: Face, flat: FlatMap, normal: Array, points: Array) -> li
             return parts_of_one([FaceHulls([triangle], [], points, normal, None) for triangle in triangles])
     tolerance = NEARLY * face.surface.size
     arcs = [flat.circle([curve], tolerance) for curve in face.boundary] if face.outer is not None or face.holes else []
-    return [FaceHulls(_of_flat(face, flat, arcs), _holes(face, flat, normal, arcs), points, normal, None)]
+    hollows = _holes(face, flat, normal, arcs)
+    if face.outer is not None:
+        # For balls, which planes do not part from it where they are in a hole or beside it.
+        hollows.append(Sheet.of(face, flat, normal, arcs))
+    return [FaceHulls(_of_flat(face, flat, arcs), hollows, points, normal, None)]
 
 
-def _whole(face: Face, flat: FlatMap, chain: range, arcs: Arcs) -> Circle | None:
+def _whole(face: Face, flat: FlatMap, chain: range, arcs: Boundary) -> Circle | None:
     """The circle that all of a chain of a boundary is."""
     if len(chain) == 1:
         return arcs[chain[0]]
@@ -46,11 +54,11 @@ def _whole(face: Face, flat: FlatMap, chain: range, arcs: Arcs) -> Circle | None
     return flat.circle([face.boundary[k] for k in chain], NEARLY * face.surface.size)
 
 
-def _corners(face: Face, flat: FlatMap, chain: int = 0) -> Array | None:
-    """The corners in space (n, 3) of a chain of a flat face's boundary, or None where that has parts that are bent."""
-    if face.outer is None and chain == 0:
+def _corners(face: Face, flat: FlatMap) -> Array | None:
+    """The corners in space (n, 3) of what goes around a flat face, or None where that has parts that are bent."""
+    if face.outer is None:
         return None
-    curves = [face.boundary[k] for k in face.chains[chain]]
+    curves = [face.boundary[k] for k in face.chains[0]]
     if any(curve.degree > 1 for curve in curves):
         return None
     # Each curve ends where the next one begins.
@@ -64,7 +72,7 @@ def _inward(corners: Array, normal: Array) -> Array:
     return np.asarray(ways / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 
 
-def _of_flat(face: Face, flat: FlatMap, arcs: Arcs) -> list[tuple[Discs, float]]:
+def _of_flat(face: Face, flat: FlatMap, arcs: Boundary) -> list[tuple[Discs, float]]:
     """Hulls of a flat face: of the control points of what goes around it, or of its circles and what is not round."""
     surface = face.surface
     if face.outer is None:
@@ -88,19 +96,16 @@ def _disc(circle: Circle) -> Discs:
     return Discs(circle.center[None], circle.axis[None], np.array([circle.radius]))
 
 
-def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow | Prism | Ring]:
-    """The holes of a flat face that are convex polygons; of others with an arc the largest disc about its middle."""
-    found: list[Hollow | Prism | Ring] = []
+def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Boundary) -> list[AnyHollow]:
+    """Convex sets in the holes of a flat face: what is within all sides, and the largest disc about an arc's middle."""
+    found: list[AnyHollow] = []
     size = face.surface.size
-    for number, chain in enumerate(face.chains[1:] if face.holes else (), 1):
-        corners = _corners(face, flat, number)
-        if corners is not None:
-            found += _prism(corners, normal, size, flat.off)
-            continue
+    for chain in face.chains[1:] if face.holes else ():
         whole = _whole(face, flat, chain, arcs)
         if whole is not None:
             found += _disc_hole(whole.center, normal, whole.radius - whole.deviation - flat.off, size)
             continue
+        found += _prisms(boundary_pieces(face, flat, normal, chain, arcs), normal, size)
         circle = next((arcs[k] for k in chain if arcs[k] is not None), None)
         if circle is None or not _is_beside(face, flat, circle.center):
             continue
@@ -141,13 +146,42 @@ def hole_of_ring(surface: NurbsSurface, normal: Array) -> list[Hollow | Prism | 
     return []
 
 
-def _prism(corners: Array, normal: Array, size: float, off: float) -> list[Hollow | Prism | Ring]:
-    """The hole with these corners, which go around it clockwise, if it is convex."""
-    inward = -_inward(corners, normal)
-    inward, borders = inward[inward.any(axis=1)], (inward * corners).sum(axis=1)[inward.any(axis=1)]
-    if (inward @ corners.T - borders[:, None] < -CONVEX * size).any():
+def _prisms(pieces: BoundaryPieces | None, normal: Array, size: float) -> list[Prism]:
+    """Convex sets in a hole of straight sides and hollow arcs.
+
+    One is what is within all sides, and within arcs along all their normals: from a point of that, all of the boundary
+    is seen to go around the same way, so that the point is in the hole; where the hole is convex, that is all of it.
+    Of a polygon there are others as well, for every side what is within those sides which it is within and which are
+    within it, if no side leads through that.
+    """
+    # A hole goes around clockwise.
+    if pieces is None or (pieces.clockwise < 0.0).any():
         return []
-    return [Prism(normal, inward, borders + off)]
+    begins, ends = pieces.begins, pieces.ends
+    inward = np.cross(ends - begins, normal)
+    inward /= np.linalg.norm(inward, axis=1)[:, None]
+    borders = (inward * begins).sum(axis=1)
+    arcs = pieces.arcs._replace(radii=pieces.arcs.radii - pieces.off)
+    sets = np.ones((1, len(inward)), dtype=bool)
+    if not len(arcs.radii):
+        of_ends = np.stack([begins @ inward.T, ends @ inward.T]) - borders
+        is_within = of_ends.min(axis=0) >= -CONVEX * size
+        if not is_within.all():
+            sets = np.unique(is_within & is_within.T, axis=0)
+            sets = sets[[not _is_crossed(of_ends[:, :, rows], CONVEX * size) for rows in sets]]
+    return [Prism(normal, inward[rows], borders[rows] + pieces.off, arcs) for rows in sets]
+
+
+def _is_crossed(depths: Array, least: float) -> bool:
+    """Whether segments, of whose ends the depths (2, m, n) in half spaces are given, lead deeper than a length into
+    what is in all of these.
+    """
+    first, last = depths[0] - least, depths[1] - least
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = first / (first - last)
+    enters = np.where((first <= 0.0) & (last > 0.0), at, 0.0).max(axis=1)
+    leaves = np.where((first > 0.0) & (last <= 0.0), at, 1.0).min(axis=1)
+    return bool((((first > 0.0) | (last > 0.0)).all(axis=1) & (enters < leaves)).any())
 
 
 def _is_beside(face: Face, flat: FlatMap, point: Array) -> bool:

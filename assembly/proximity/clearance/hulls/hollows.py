@@ -1,47 +1,23 @@
-"""Discs, what hulls are made of, and hollows: convex sets into which faces do not go; tubes and rings, for balls."""
+"""Hollows: convex sets into which faces do not go; tubes and rings, for balls; what is known of a face."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, pi, sin
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "Ring", "Tube", "parts_of_one"]
+from assembly.proximity.clearance.hulls.discs import Discs
+from assembly.proximity.clearance.hulls.prism import Prism
+from assembly.proximity.clearance.hulls.sheet import Sheet
+
+__all__ = ["AnyHollow", "FaceHulls", "ForBalls", "Hollow", "Ring", "Tube", "parts_of_one"]
 
 Array = NDArray[np.float64]
 # [radii] A point so near to an axis is on it: rounding decides where it is seen from there.
 ON_AXIS = 1e-9
-
-
-class Discs(NamedTuple):
-    """Discs, and points as discs without a radius, whose axes are zero: centers, axes (m, 3), radii (m,)."""
-
-    centers: Array
-    axes: Array
-    radii: Array
-
-    @classmethod
-    def of_points(cls, points: Array) -> Discs:
-        """Points (m, 3)."""
-        return cls(points, np.zeros_like(points), np.zeros(len(points)))
-
-    def reach(self, normals: Array) -> Array:
-        """How far each reaches along unit vectors (k, 3): (m, k)."""
-        far: Array = self.centers @ normals.T
-        (wide,) = np.nonzero(self.radii)
-        if len(wide):
-            axes = self.axes[wide]
-            # The part across the axis, and not the root of what is left of one, which is off by 1e-8 at zero.
-            across = normals - (axes @ normals.T)[..., None] * axes[:, None]
-            far[wide] += self.radii[wide, None] * np.sqrt((across**2).sum(axis=2))
-        return far
-
-    def posed(self, turn: Array, shift: Array) -> Discs:
-        """The same after x -> turn x + shift."""
-        return Discs(self.centers @ turn.T + shift, self.axes @ turn.T, self.radii)
 
 
 class Hollow(NamedTuple):
@@ -110,45 +86,6 @@ class Hollow(NamedTuple):
     def scaled(self, left: float, shift: Array) -> Hollow:
         """The same after x -> left x + shift."""
         return self._replace(center=left * self.center + shift, radius=left * self.radius)
-
-
-class Prism(NamedTuple):
-    """What is within a polygon that is convex, and before and behind it.
-
-    Attributes
-    ----------
-    axis : (3,)
-        Across the polygon.
-    inward, borders : (n, 3), (n,)
-        Of each side, a unit vector from it into the polygon, and its height along that.
-    """
-
-    axis: Array
-    inward: Array
-    borders: Array
-    slope: float = 0.0
-    is_wall: bool = True
-
-    def depth(self, discs: Discs) -> Array:
-        """How far discs (m,) are within, at least; below zero where they may not be."""
-        return np.asarray((-discs.reach(-self.inward) - self.borders).min(axis=1))
-
-    def depth_of(self, points: Array) -> Array:
-        """How far points (m, 3) are within."""
-        return self.depth(Discs.of_points(points))
-
-    def planes(self, near: Array) -> tuple[Array, Array]:  # noqa: ARG002 - as of a `Hollow`
-        """The half spaces that it is in: unit vectors inward, and the heights of their borders."""
-        return self.inward, self.borders
-
-    def posed(self, turn: Array, shift: Array) -> Prism:
-        """The same after x -> turn x + shift."""
-        inward = self.inward @ turn.T
-        return self._replace(axis=turn @ self.axis, inward=inward, borders=self.borders + inward @ shift)
-
-    def scaled(self, left: float, shift: Array) -> Prism:
-        """The same after x -> left x + shift."""
-        return self._replace(borders=left * self.borders + self.inward @ shift)
 
 
 class Tube(NamedTuple):
@@ -296,6 +233,11 @@ _SPHERE = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (
 _SPHERE /= np.linalg.norm(_SPHERE, axis=1, keepdims=True)
 
 
+# What is for balls alone: it is not convex, and what is in it with all of its discs need not be.
+ForBalls: TypeAlias = Tube | Ring | Sheet
+AnyHollow: TypeAlias = Hollow | Prism | ForBalls
+
+
 class FaceHulls(NamedTuple):
     """What is known of a face.
 
@@ -303,7 +245,7 @@ class FaceHulls(NamedTuple):
     ----------
     hulls : list of (Discs, float)
         Each with the radius of a ball around all of it.
-    hollows : sequence of Hollow, Prism, Tube or Ring
+    hollows : sequence of Hollow, Prism, Tube, Ring or Sheet
     points : (p, 3)
         Points of it.
     direction : (3,) or None
@@ -313,7 +255,7 @@ class FaceHulls(NamedTuple):
     """
 
     hulls: list[tuple[Discs, float]]
-    hollows: Sequence[Hollow | Prism | Tube | Ring]
+    hollows: Sequence[AnyHollow]
     points: Array
     direction: Array | None
     line: tuple[Array, Array] | None

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def looped_part(face: Face) -> NurbsSurface:
     """A part of a face's surface that contains the face: in directions that are not closed, from loop to loop.
 
-    A face reaches farthest in u, and in v, on its boundary, or at a pole, which no boundary curve is at.
+    A face reaches farthest in u, and in v, on its boundary, or at a pole, if that is in the face.
     """
     surface = face.surface
     if (face.outer is None and not face.holes) or not surface._is_clamped:
@@ -27,13 +27,23 @@ def looped_part(face: Face) -> NurbsSurface:
     is_less = False
     for way in (0, 1):
         first, last = surface.domain[way]
-        low = first if poles & (1 << 2 * way) else max(first, float(nets[:, way].min()))
-        high = last if poles & (2 << 2 * way) else min(last, float(nets[:, way].max()))
+        low, high = max(first, float(nets[:, way].min())), min(last, float(nets[:, way].max()))
+        if poles & (1 << 2 * way) and _has(face, way, first, low):
+            low = first
+        if poles & (2 << 2 * way) and _has(face, way, high, last):
+            high = last
         if surface.closed[way] or not low < high or (low, high) == (first, last):
             continue
         rows, knots[way] = _cut(np.moveaxis(points, way, 0), knots[way], surface.degree[way], low, high)
         points, is_less = np.moveaxis(rows, 0, way), True
     return surface._from_homogeneous(points, knots, surface.degree) if is_less else surface
+
+
+def _has(face: Face, way: int, begin: float, end: float) -> bool:
+    """Whether what is between a pole and the boundary, where no boundary curve is, belongs to a face."""
+    at = [0.5 * (first + last) for first, last in face.surface.domain]
+    at[way] = 0.5 * (begin + end)
+    return not begin < end or bool(face.contains(*at))
 
 
 def _cut(points: Array, knots: Array, degree: int, low: float, high: float) -> tuple[Array, Array]:

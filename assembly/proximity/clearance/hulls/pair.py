@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls
-from assembly.proximity.clearance.hulls.hollows import Ring, Tube
 from assembly.proximity.clearance.hulls.outside import is_outside
 from assembly.proximity.clearance.parting import least_change
 
@@ -96,7 +95,7 @@ class _Gaps:
         places = [{int(face): place for place, face in enumerate(near)} for near in (self.near_a, self.near_b)]
         for number, (face, hollow) in enumerate((*self.a.hollows, *self.b.hollows)):
             others, place = (self.b, places[0].get(face)) if number < count else (self.a, places[1].get(face))
-            if place is None or (isinstance(hollow, Tube | Ring) and not others.is_ball.any()):
+            if place is None:
                 continue
             depth = others.within(hollow)[self.near_b if number < count else self.near_a]
             row = by_hollow[place] if number < count else by_hollow[:, place]

@@ -131,8 +131,9 @@ class HullAnswers:
         (one, other), least = self._pairs[k], float(self._minimum[k])
         if self._apart[k] > least:
             return Answer(Verdict.CLEAR, float(self._apart[k]))
-        posed = self._hulls[other].posed(*self._relative(k))
-        return answer_by_hulls(self._hulls[one], posed, least, self._touching)
+        first, second = self._hulls[one], self._hulls[other]
+        posed = second.facing(first).posed(*self._relative(k))
+        return answer_by_hulls(first.facing(second), posed, least, self._touching)
 
     def _ask_whether_it_crosses(self, k: int) -> Answer | None:
         one, other = self._pairs[k]
