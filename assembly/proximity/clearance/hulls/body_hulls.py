@@ -24,9 +24,11 @@ from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
 from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, ForBalls, Hollow
+from assembly.proximity.clearance.hulls.pockets import pockets
 from assembly.proximity.clearance.hulls.prism import Prism
+from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 
-__all__ = ["BodyHulls", "hulls_of_body"]
+__all__ = ["BodyHulls", "hulls_of_body", "with_pockets"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -169,6 +171,11 @@ def hulls_of_body(faces: tuple[Face, ...]) -> BodyHulls:
     return _made_of(first_equal(faces))
 
 
+def with_pockets(faces: tuple[Face, ...]) -> BodyHulls | None:
+    """The same with what is in pockets of faces on cylinders, which take longer to find; None where there are none."""
+    return _with_pockets(first_equal(faces))
+
+
 @lru_cache(maxsize=256)
 def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
     by_face = [hulls_of_face(face) for face in faces]
@@ -190,6 +197,18 @@ def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
         distinct([face.direction for face in found if face.direction is not None]),
         *_lines(found),
     )
+
+
+@lru_cache(maxsize=256)
+def _with_pockets(faces: tuple[Face, ...]) -> BodyHulls | None:
+    cut = [number for number, face in enumerate(faces) if face.holes and not face.surface.is_parallelogram]
+    if not cut:
+        return None
+    hulls = _made_of(faces)
+    forms = [nearly_elementary(face.surface) for face in faces]
+    found = {number: pockets(faces[number], forms[number], forms[:number] + forms[number + 1 :]) for number in cut}
+    more = [(part, prism) for part, face in enumerate(hulls.part_of.tolist()) for prism in found.get(face, [])]
+    return replace(hulls, hollows=(*hulls.hollows, *more)) if more else None
 
 
 def _seats(face: FaceHulls, others: list[FaceHulls]) -> list[Hollow]:

@@ -40,6 +40,11 @@ class Hollow(NamedTuple):
     slope: float = 0.0
     is_wall: bool = True
 
+    @property
+    def is_one_sided(self) -> bool:
+        """Whether a half line along the axis stays in it, and none against that."""
+        return self.slope > 0.0
+
     def depth(self, discs: Discs) -> Array:
         """How far discs (m,) are within, at least; below zero where they may not be."""
         away = discs.centers - self.center
@@ -113,7 +118,7 @@ class Tube(NamedTuple):
     is_wall: bool
     # No half line is known to stay in it.
     axis: Array = np.zeros(3)
-    slope: float = 0.0
+    is_one_sided: bool = False
 
     def depth(self, discs: Discs) -> Array:
         """How far the centers of discs (m,) are within: of balls, which are points with a radius, their centers."""
@@ -175,7 +180,7 @@ class Ring(NamedTuple):
     off: float
     # No half line is known to stay in it.
     axis: Array = np.zeros(3)
-    slope: float = 0.0
+    is_one_sided: bool = False
     is_wall: bool = True
 
     def depth(self, discs: Discs) -> Array:

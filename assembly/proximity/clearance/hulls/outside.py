@@ -51,7 +51,7 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
             inside = hollow.depth_of(body.points) > rounding
             along = normals @ hollow.axis
             leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
-            if hollow.slope > 0.0:
+            if hollow.is_one_sided:
                 leads_along &= along > 0.0
             misses[:, face] |= inside[:, None] & leads_along
     leaves = np.zeros(len(body.of_face), dtype=bool)

@@ -46,13 +46,15 @@ class Prism(NamedTuple):
     inward, borders : (n, 3), (n,)
         Of each straight side, a unit vector from it into the prism, and its height along that.
     arcs : Arcs
+    is_one_sided : bool
+        Whether a half line along the axis stays in it, and none against that.
     """
 
     axis: Array
     inward: Array
     borders: Array
     arcs: Arcs = NO_ARCS
-    slope: float = 0.0
+    is_one_sided: bool = False
     is_wall: bool = True
 
     def depths(self, discs: Discs) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
-from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
+from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body, with_pockets
 from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
 
@@ -131,9 +131,18 @@ class HullAnswers:
         (one, other), least = self._pairs[k], float(self._minimum[k])
         if self._apart[k] > least:
             return Answer(Verdict.CLEAR, float(self._apart[k]))
-        first, second = self._hulls[one], self._hulls[other]
+        return self._answer(k, self._hulls[one], self._hulls[other]) or self._answer_by_pockets(k)
+
+    def _answer(self, k: int, first: BodyHulls, second: BodyHulls) -> Answer | None:
         posed = second.facing(first).posed(*self._relative(k))
-        return answer_by_hulls(first.facing(second), posed, least, self._touching)
+        return answer_by_hulls(first.facing(second), posed, float(self._minimum[k]), self._touching)
+
+    def _answer_by_pockets(self, k: int) -> Answer | None:
+        found = [with_pockets(self._shapes[body]) for body in self._pairs[k]]
+        if found == [None, None]:
+            return None
+        hulls = [own or self._hulls[body] for own, body in zip(found, self._pairs[k], strict=True)]
+        return self._answer(k, *hulls)
 
     def _ask_whether_it_crosses(self, k: int) -> Answer | None:
         one, other = self._pairs[k]

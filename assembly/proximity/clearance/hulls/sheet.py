@@ -63,7 +63,7 @@ class Sheet(NamedTuple):
     shift: Array
     # No half line is known to miss it.
     axis: Array = np.zeros(3)
-    slope: float = 0.0
+    is_one_sided: bool = False
     is_wall: bool = True
 
     @classmethod
