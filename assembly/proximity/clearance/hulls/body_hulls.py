@@ -24,7 +24,7 @@ from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
 from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, ForBalls, Hollow
-from assembly.proximity.clearance.hulls.pockets import pockets
+from assembly.proximity.clearance.hulls.pockets import bent_wall
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 
@@ -172,13 +172,21 @@ def hulls_of_body(faces: tuple[Face, ...]) -> BodyHulls:
 
 
 def with_pockets(faces: tuple[Face, ...]) -> BodyHulls | None:
-    """The same with what is in pockets of faces on cylinders, which take longer to find; None where there are none."""
+    """The same with pockets in faces on cylinders, and hulls of bent ends, which take longer to find; None without."""
     return _with_pockets(first_equal(faces))
 
 
 @lru_cache(maxsize=256)
 def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
-    by_face = [hulls_of_face(face) for face in faces]
+    return _joined(_by_face(faces))
+
+
+@lru_cache(maxsize=256)
+def _by_face(faces: tuple[Face, ...]) -> list[list[FaceHulls]]:
+    return [hulls_of_face(face) for face in faces]
+
+
+def _joined(by_face: list[list[FaceHulls]]) -> BodyHulls:
     found = [part for parts in by_face for part in parts]
     hulls = [hull for face in found for hull in face.hulls]
     sizes = [len(discs.radii) for discs, _ in hulls]
@@ -201,14 +209,18 @@ def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
 
 @lru_cache(maxsize=256)
 def _with_pockets(faces: tuple[Face, ...]) -> BodyHulls | None:
-    cut = [number for number, face in enumerate(faces) if face.holes and not face.surface.is_parallelogram]
-    if not cut:
-        return None
-    hulls = _made_of(faces)
-    forms = [nearly_elementary(face.surface) for face in faces]
-    found = {number: pockets(faces[number], forms[number], forms[:number] + forms[number + 1 :]) for number in cut}
-    more = [(part, prism) for part, face in enumerate(hulls.part_of.tolist()) for prism in found.get(face, [])]
-    return replace(hulls, hollows=(*hulls.hollows, *more)) if more else None
+    cut = [number for number, face in enumerate(faces) if face.outer is not None and not face.surface.is_parallelogram]
+    forms = [nearly_elementary(face.surface) for face in faces] if cut else []
+    by_face, is_more = [*_by_face(faces)], False
+    for number in cut:
+        bent = bent_wall(faces[number], forms[number], forms[:number] + forms[number + 1 :])
+        if bent is not None:
+            is_more = True
+            by_face[number] = [
+                part._replace(hollows=[*part.hollows, *bent.pockets], hulls=[*part.hulls, bent.hull])
+                for part in by_face[number]
+            ]
+    return _joined(by_face) if is_more else None
 
 
 def _seats(face: FaceHulls, others: list[FaceHulls]) -> list[Hollow]:

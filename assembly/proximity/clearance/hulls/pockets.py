@@ -21,9 +21,10 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cylinder, Form, Plane
 from assembly.geometry.recognition.nets import bezier_dot
 from assembly.geometry.splines import bezier
+from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.prism import NO_ARCS, Arcs, Prism
 
-__all__ = ["pockets"]
+__all__ = ["Bent", "bent_wall"]
 
 Array = NDArray[np.float64]
 # How far the control points of an edge may be from a wall, in parts of the size of the face.
@@ -34,6 +35,8 @@ ALONG = 1e-9
 LOW = 1e-6
 # [radii] How far from its axis a bore that leads through a cylinder is, at most.
 BESIDE = 0.999
+# What control points are off, in parts of the largest coordinate.
+ROUNDING = 1e-13
 # In how many parts a curve of the boundary is, at least.
 PARTS = 16
 # Holes of a face that are asked, at most.
@@ -76,11 +79,38 @@ class _Wall(NamedTuple):
     curve: _Curve
 
 
-def pockets(face: Face, form: Form, walls: list[Form]) -> list[Prism]:
-    """Convex sets of the pockets in a cylinder, above its axis; `walls` are what the other faces of the body are."""
+class Bent(NamedTuple):
+    """What is known of a face on a cylinder with a boundary that is not all along its parameters.
+
+    Attributes
+    ----------
+    hull : (Discs, float)
+        Every line of the cylinder is in the face from boundary to boundary, and so in the hull of that; with a pad.
+    pockets : list of Prism
+        Convex sets in its holes, above its axis.
+    """
+
+    hull: tuple[Discs, float]
+    pockets: list[Prism]
+
+
+def bent_wall(face: Face, form: Form, walls: list[Form]) -> Bent | None:
+    """What is known of a face, if it is one of these; `walls` are what the other faces of the body are."""
     if not isinstance(form, Cylinder) or face.outer is None or len(face.chains) > MOST:
-        return []
+        return None
+    is_along = [any(np.ptp(curve.control_points[:, k]) == 0.0 for k in (0, 1)) for curve in face.boundary]
+    if all(is_along[k] for k in face.chains[0]) and all(
+        len(chain) == 1 and is_along[chain[0]] for chain in face.chains[1:]
+    ):
+        # Its ends say as much.
+        return None
     curves = _curves_of(face)
+    points = np.concatenate([curve.points for curve in curves])
+    pad = 2.0 * form.deviation + ROUNDING * float(np.abs(points).max())
+    return Bent((Discs.of_points(points), pad), _pockets(face, form, walls, curves))
+
+
+def _pockets(face: Face, form: Cylinder, walls: list[Form], curves: list[_Curve]) -> list[Prism]:
     off = NEARLY * float(face.surface.size)
     found = []
     for chain in face.chains[1:]:

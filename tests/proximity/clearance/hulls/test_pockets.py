@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
-from assembly.proximity.clearance.hulls.body_hulls import with_pockets
+from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body, with_pockets
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.clearance.hulls.scene import HullAnswers
 from tests.proximity.clearance.hulls.test_face_hulls import polygon, ring, samples
-from tests.proximity.clearance.scenes import at, faces_of
+from tests.proximity.clearance.scenes import at, direction, faces_of
 from tests.studies.machined import turned_part
 
 TOUCHING = 1e-7
@@ -89,6 +89,26 @@ def bored_shaft(radius=1.6, height=5.0):
     return wall_with(hole), inner, ends[0], ends[2]
 
 
+def piston(radius, height):
+    """The same with a bore that ends in the shaft's wall."""
+    wall, bore, *ends = bored_shaft(radius, height)
+    surface = bore.surface
+
+    def edge(side):
+        """Where the bore comes to the shaft's wall."""
+        low, high = surface.domain[0]
+        u = np.linspace(low, high, 161)
+        middle = 0.5 * sum(surface.domain[1])
+        across = surface.evaluate(u, np.full(161, middle))[:, 1]
+        v = middle + side * np.sqrt(RADIUS**2 - across**2)
+        spline = make_interp_spline(u, v, k=5)
+        spots = np.array([spline.t[k + 1 : k + 6].mean() for k in range(161)])
+        return asm.NurbsCurve(np.column_stack([spots, spline.c]), spline.t, 5)
+
+    loop = edge(-1.0), edge(1.0).reversed()
+    return (wall, asm.Face(surface, [loop[0]], [[loop[1]]], name="bore", reversed=True), *ends)
+
+
 def answer(first, second, pose):
     shapes = [faces_of(first), faces_of(second)]
     return HullAnswers(shapes, [(0, 1)], [0.0], np.array([at(0, 0, 0), pose]), TOUCHING).held(0)
@@ -150,9 +170,27 @@ def test_a_key_in_its_pocket_and_a_pin_across_a_shaft_are_told_of():
     assert answer(bored_shaft(), asm.shapes.solid_cylinder(1.5, 40), across + np.r_[0, 0, 0.2, np.zeros(4)]) is None
 
 
+def test_a_bore_across_a_shaft_reaches_no_farther_than_that():
+    """Its ends counted as if they were flat: a piston with a bore for its pin seemed to be in its cylinder."""
+    rng = np.random.default_rng(5)
+    shaft = piston(3.0, 5.0)
+    hulls, known = with_pockets(faces_of(shaft)), hulls_of_body(faces_of(shaft))
+    bore = [part for part, face in enumerate(hulls.part_of) if shaft[face].name == "bore"]
+    normals = np.array([*np.eye(3), *-np.eye(3), *(direction(rng) for _ in range(60))])
+    points = samples(shaft[1])
+    assert len(points) > 100 and np.hypot(*points[:, :2].T).max() <= RADIUS + 1e-6
+    reach = hulls.reach(normals)[bore].max(axis=0)
+    assert (points @ normals.T <= reach + 1e-9).all()
+    # Where it is widest it is as wide as the shaft.
+    along = np.array([(np.cos(0.2), np.sin(0.2), 0.0)])
+    assert hulls.reach(along)[bore].max() < RADIUS + 1e-3 < RADIUS + 0.1 < known.reach(along)[bore].max()
+    tube = turned_part([(RADIUS + 0.02, -50), (20, -50), (20, 50), (RADIUS + 0.02, 50)])
+    told = answer(tube, shaft, at(0, 0, 3.0))
+    assert told is not None and told.verdict is Verdict.CLEAR
+
+
 def test_what_is_no_pocket_is_none():
     """Without the walls nobody knows what a hole is; a shaft without holes has none."""
     wall, *walls = keyed_shaft()
-    assert with_pockets((wall,)) is None
-    assert with_pockets((wall, walls[0])) is None
+    assert prisms_of((wall,)) == prisms_of((wall, walls[0])) == []
     assert with_pockets(faces_of(asm.shapes.solid_cylinder(4.0, 40))) is None
