@@ -11,6 +11,7 @@ that a cylinder, a cone, a ball or a torus is made of. It reaches no farther tha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Ring, Tube, depths_within
 
 __all__ = ["BodyHulls", "hulls_of_body"]
 
@@ -77,13 +78,13 @@ class BodyHulls:
         rows = self.discs.reach(normals)
         return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
 
-    def within(self, hollow: Hollow | Prism | Tube | Ring) -> Array:
-        """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
-        rows = hollow.depth(self.discs)
-        if isinstance(hollow, Tube | Ring):
-            # It is not convex: what is in it with all of its discs need not be.
-            rows[~self.is_ball] = -np.inf
-        return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
+    def within(self, hollows: Sequence[Hollow | Prism | Tube | Ring]) -> Array:
+        """How far faces are from the borders of hollows that they are within, at least: (h, f); below zero outside."""
+        rows = depths_within(hollows, self.discs)
+        # What is not convex: what is in it with all of its discs need not be.
+        bent = np.array([isinstance(hollow, Tube | Ring) for hollow in hollows], dtype=bool)
+        rows[bent[:, None] & ~self.is_ball] = -np.inf
+        return np.maximum.reduceat(np.minimum.reduceat(rows, self.first, axis=1) - self.pad, self.of_face, axis=1)
 
     def discs_of(self, face: int) -> Discs:
         """The discs and points of all hulls of a face."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls
+from assembly.proximity.clearance.hulls.hollows import Discs, depths_within
 
 __all__ = ["is_outside"]
 
@@ -46,14 +47,14 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
     # Of every point, face and half line, whether it does not meet the face.
     misses = np.zeros(beyond.shape, dtype=bool)
     misses[beyond @ leads > 0.0] = True
-    for face, hollow in other.hollows:
-        if hollow.axis.any():
-            inside = hollow.depth_of(body.points) > rounding
-            along = normals @ hollow.axis
-            leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
-            if hollow.slope > 0.0:
-                leads_along &= along > 0.0
-            misses[:, face] |= inside[:, None] & leads_along
+    open_ended = [(face, hollow) for face, hollow in other.hollows if hollow.axis.any()]
+    depths = depths_within([hollow for _, hollow in open_ended], Discs.of_points(body.points))
+    for (face, hollow), depth in zip(open_ended, depths, strict=True):
+        along = normals @ hollow.axis
+        leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
+        if hollow.slope > 0.0:
+            leads_along &= along > 0.0
+        misses[:, face] |= (depth > rounding)[:, None] & leads_along
     leaves = np.zeros(len(body.of_face), dtype=bool)
     # The points of which a half line misses all faces.
     free, _ = np.nonzero(np.asarray(misses.all(axis=1)))
