@@ -15,6 +15,7 @@ from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
 from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
+from assembly.proximity.clearance.hulls.planes import normal_between
 
 __all__ = ["HullAnswers"]
 
@@ -40,6 +41,11 @@ class HullAnswers:
         Whether nothing is told of any pair.
     last : HullAnswers, optional
         Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here.
+
+    Attributes
+    ----------
+    looked : dict of int to Answer, optional
+        What looks have told of the other pairs, by their numbers, once somebody has asked.
     """
 
     def __init__(
@@ -54,6 +60,7 @@ class HullAnswers:
     ) -> None:
         self._shapes, self._pairs, self._minimum = shapes, pairs, minimum
         self._q, self._touching, self._is_silent = q, touching, is_silent
+        self.looked: dict[int, Answer] | None = None
         self._held: dict[int, Answer | None] = {}
         self._crossings: dict[int, Answer | None] = {}
         if last is not None:
@@ -77,9 +84,19 @@ class HullAnswers:
         """That all pairs are clear or touch, or None at the first of which hulls do not tell it."""
         return _all(self.held(k) for k in range(len(self._pairs)))
 
-    def all_told(self) -> list[Answer] | None:
-        """What all pairs are, those that cross as well, or None at the first of which hulls do not tell it."""
-        return _all(self.held(k) or self.crossing(k) for k in range(len(self._pairs)))
+    def told_or_crossing(self) -> dict[int, Answer]:
+        """The pairs that are told to be clear, to touch or to cross, by their numbers."""
+        answers = ((k, self.held(k) or self.crossing(k)) for k in range(len(self._pairs)))
+        return {k: answer for k, answer in answers if answer is not None}
+
+    def parted(self, k: int) -> bool:
+        """Whether a plane is told to be between the bodies of a pair."""
+        if self._is_silent:
+            return False
+        if self._apart[k] > 0.0:
+            return True
+        one, other = self._pairs[k]
+        return normal_between(self._hulls[one], self._hulls[other].posed(*self._relative(k))) is not None
 
     def told(self) -> dict[int, Answer]:
         """The pairs that are told to be clear or to touch, by their numbers."""
@@ -88,9 +105,11 @@ class HullAnswers:
 
     def any_touches(self) -> bool:
         """Whether any pair is told to touch or to cross: then not all are clear."""
-        pairs = range(len(self._pairs))
-        held = (answer for k in pairs if (answer := self.held(k)) is not None)
-        return any(answer.verdict is not Verdict.CLEAR for answer in held) or self.any_crosses()
+        return any(self._touches(k) for k in range(len(self._pairs)))
+
+    def _touches(self, k: int) -> bool:
+        held = self.held(k)
+        return self.crossing(k) is not None if held is None else held.verdict is not Verdict.CLEAR
 
     def any_crosses(self) -> bool:
         """Whether any pair is told to cross."""

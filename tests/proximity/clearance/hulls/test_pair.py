@@ -294,3 +294,20 @@ def test_what_is_known_of_bodies_that_stay_is_what_is_told_of_them_anew():
     for k in range(5):
         assert repr(later.held(k)) == repr(anew.held(k)) and repr(later.crossing(k)) == repr(anew.crossing(k))
     assert later.held(1).bound > first.held(1).bound
+
+
+@pytest.mark.parametrize(
+    ("at", "touches", "parted"),
+    [((40, 0, 0), False, True), ((20, 0, 0), True, False), ((15, 0, 0), True, False), ((0, 0, 22), False, False)],
+    ids=["beside", "flush", "crossing", "in its hole"],
+)
+def test_what_touches_or_is_parted_by_a_plane(at, touches, parted):
+    plate = faces_of(asm.shapes.plate(30, 30, 10, [(0, 0, 4.5)]))
+    pin = faces_of(asm.shapes.box(10, 10, 10) if at[0] else asm.shapes.solid_cylinder(4.0, 60))
+    q = np.tile([0.0, 0, 0, 1, 0, 0, 0], (2, 1))
+    q[1, :3] = at
+    answers = HullAnswers([plate, pin], [(0, 1)], [0.0], q, TOUCHING)
+    assert answers.any_touches() == touches
+    assert answers.parted(0) == parted
+    # Of wires nothing is told.
+    assert not HullAnswers([plate, pin], [(0, 1)], [0.0], q, TOUCHING, True).parted(0)
