@@ -280,7 +280,9 @@ class Ring(NamedTuple):
 def depths_within(hollows: Sequence[Hollow | Prism | Tube | Ring], discs: Discs) -> Array:
     """Of every hollow how far discs (m,) are within, at least: (h, m); cylinders and cones are asked at once."""
     found = np.empty((len(hollows), len(discs.radii)))
-    some = {k: hollow for k, hollow in enumerate(hollows) if isinstance(hollow, Hollow) and hollow.axis.any()}
+    axes = np.array([hollow.axis for hollow in hollows]).reshape(-1, 3)
+    both = zip(hollows, np.count_nonzero(axes, axis=1).tolist(), strict=True)
+    some = {k: hollow for k, (hollow, parts) in enumerate(both) if parts and isinstance(hollow, Hollow)}
     if some:
         found[list(some)] = _depths_in_round(list(some.values()), discs)
     for k, hollow in enumerate(hollows):

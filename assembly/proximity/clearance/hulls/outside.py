@@ -47,14 +47,16 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
     # Of every point, face and half line, whether it does not meet the face.
     misses = np.zeros(beyond.shape, dtype=bool)
     misses[beyond @ leads > 0.0] = True
-    open_ended = [(face, hollow) for face, hollow in other.hollows if hollow.axis.any()]
-    depths = depths_within([hollow for _, hollow in open_ended], Discs.of_points(body.points))
-    for (face, hollow), depth in zip(open_ended, depths, strict=True):
+    axes = np.array([hollow.axis for _, hollow in other.hollows]).reshape(-1, 3)
+    open_ended = [other.hollows[k] for k in np.flatnonzero(axes.any(axis=1))]
+    inside = depths_within([hollow for _, hollow in open_ended], Discs.of_points(body.points)) > rounding
+    for k in np.flatnonzero(inside.any(axis=1)).tolist():
+        face, hollow = open_ended[k]
         along = normals @ hollow.axis
         leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
         if hollow.slope > 0.0:
             leads_along &= along > 0.0
-        misses[:, face] |= (depth > rounding)[:, None] & leads_along
+        misses[:, face] |= inside[k, :, None] & leads_along
     leaves = np.zeros(len(body.of_face), dtype=bool)
     # The points of which a half line misses all faces.
     free, _ = np.nonzero(np.asarray(misses.all(axis=1)))
