@@ -40,7 +40,8 @@ class HullAnswers:
     is_silent : bool
         Whether nothing is told of any pair.
     last : HullAnswers, optional
-        Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here.
+        Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here, and
+        by so much less of those that have moved by rounding.
 
     Attributes
     ----------
@@ -64,9 +65,30 @@ class HullAnswers:
         self._held: dict[int, Answer | None] = {}
         self._crossings: dict[int, Answer | None] = {}
         if last is not None:
-            stayed = {k for k, pair in enumerate(pairs) if (q[[*pair]] == last._q[[*pair]]).all()}
-            for mine, theirs in ((self._held, last._held), (self._crossings, last._crossings)):
-                mine.update((k, answer) for k, answer in [*theirs.items()] if k in stayed)
+            self._take_from(last)
+
+    def _take_from(self, last: HullAnswers) -> None:
+        """Take what is known of pairs of bodies that have stayed, or have moved by no more than rounding."""
+        way = np.where((self._q == last._q).all(axis=1), 0.0, np.inf)
+        for body in () if self._is_silent else self._hulls:
+            if way[body] > 0.0:
+                way[body] = self._rounded_way(last, body)
+        for k, (one, other) in enumerate(self._pairs):
+            by = float(way[one] + way[other])
+            if by == 0.0:
+                for mine, theirs in ((self._held, last._held), (self._crossings, last._crossings)):
+                    mine.update({k: theirs[k]} if k in theirs else {})
+            elif by < np.inf:
+                found = _after_a_move(last._held.get(k), by, float(self._minimum[k]), self._touching)
+                self._held.update({} if found is None else {k: found})
+
+    def _rounded_way(self, last: HullAnswers, body: int) -> float:
+        """How far points of a body have gone at most, infinite where that is more than rounding."""
+        center, radius = self._hulls[body].ball
+        extent = float(np.linalg.norm(center)) + radius
+        shift, turn = np.split(self._q[body] - last._q[body], [3])
+        way = float(np.linalg.norm(shift) + 2.0 * np.linalg.norm(turn) * extent)
+        return way if way <= ROUNDING * (float(np.linalg.norm(self._q[body, :3])) + extent) else np.inf
 
     def held(self, k: int) -> Answer | None:
         """That a pair is clear or touches, or None where hulls do not tell it."""
@@ -159,6 +181,17 @@ class HullAnswers:
             return None
         found = crossing_by_hulls((self._shapes[one], self._shapes[other]), *self._relative(k), self._touching)
         return found and replace(found, place=self._turns[one] @ found.place + self._q[one, :3])
+
+
+def _after_a_move(answer: Answer | None, by: float, least: float, touching: float) -> Answer | None:
+    """What an answer that a pair holds is worth after a move of its bodies by a length; None where it is nothing."""
+    if answer is None:
+        return None
+    bound, depth = answer.bound - by, answer.depth
+    if answer.verdict is Verdict.CLEAR:
+        return replace(answer, bound=bound) if bound > least else None
+    # What is taken so far to be clear is taken back by that much, too.
+    return replace(answer, bound=bound, depth=depth + by) if depth + by <= touching else None
 
 
 def _all(answers: Iterator[Answer | None]) -> list[Answer] | None:
