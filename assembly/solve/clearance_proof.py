@@ -53,6 +53,7 @@ __all__ = [
     "nothing_known",
     "open_recognized",
     "owned_pairs",
+    "part_of_proof",
     "prove_end",
     "proven_pairs",
 ]
@@ -135,6 +136,13 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
         packed.proofs.append(proof)
 
 
+def part_of_proof(packed: Packed, bodies: Sequence[Body], told: Container[int]) -> tuple[list[int], ClearanceProof]:
+    """The pairs that are not told of, and a proof of these alone: cells are made of their bodies and of no others."""
+    shapes, pairs, minimum = proven_pairs(packed, bodies)
+    left = [k for k in range(len(pairs)) if k not in told]
+    return left, ClearanceProof(shapes, [pairs[k] for k in left], [minimum[k] for k in left])
+
+
 def hull_answers(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> HullAnswers:
     """What hulls of faces tell of all pairs at poses (n, 7): equal poses are asked once, and no pair before it matters.
 
@@ -158,12 +166,19 @@ def hull_answers(packed: Packed, bodies: Sequence[Body], q: Array, touching: flo
 
 
 def answers_at(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer]:
-    """What all pairs are at poses (n, 7): by hulls of faces, and by looks at all pairs if these do not tell of each."""
-    told = hull_answers(packed, bodies, q, touching).all_told()
-    if told is not None:
-        return told
-    with lent_proof(packed, bodies) as proof:
-        return proof.as_they_stand(q, touching)
+    """What all pairs are at poses (n, 7): by hulls of faces, and by looks at pairs of which these do not tell."""
+    hulls = hull_answers(packed, bodies, q, touching)
+    told = hulls.told_or_crossing()
+    if len(told) == len(owned_pairs(packed)):
+        return [told[k] for k in range(len(told))]
+    if packed.proofs or not told:
+        with lent_proof(packed, bodies) as proof:
+            return proof.as_they_stand(q, touching)
+    if hulls.looked is None:
+        left, proof = part_of_proof(packed, bodies, told)
+        hulls.looked = dict(zip(left, proof.as_they_stand(q, touching), strict=True))
+    found = told | hulls.looked
+    return [found[k] for k in range(len(found))]
 
 
 def can_prove(packed: Packed) -> bool:

@@ -29,6 +29,7 @@ from assembly.solve.clearance_proof import (
     named_answers,
     nothing_known,
     owned_pairs,
+    part_of_proof,
 )
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
@@ -75,9 +76,7 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     if hulls.any_crosses():
         packed.stood = asked, touching, None
         return None
-    with lent_proof(packed, bodies) as proof:
-        proof.make_slimmer(touching * packed.scale)
-        answers, conforming = _answers(proof, q, touching * packed.scale, hulls.told())
+    answers, conforming = _left_answers(packed, bodies, q, touching * packed.scale, hulls.told())
     if answers is None:
         packed.stood = asked, touching, None
         return None
@@ -91,6 +90,23 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     found = named_answers(packed, answers)
     packed.stood = asked, touching, found
     return found
+
+
+def _left_answers(
+    packed: Packed, bodies: Sequence[Body], q: Array, touching: float, told: Mapping[int, Answer]
+) -> tuple[list[Answer] | None, list[int]]:
+    """As `_answers`; where there are no cells yet, they are made of bodies of pairs alone that are not told."""
+    if packed.proofs or not told:
+        with lent_proof(packed, bodies) as proof:
+            proof.make_slimmer(touching)
+            return _answers(proof, q, touching, told)
+    left, proof = part_of_proof(packed, bodies, told)
+    proof.make_slimmer(touching)
+    answers, conforming = _answers(proof, q, touching, {})
+    if answers is None:
+        return None, []
+    found = dict(told) | dict(zip(left, answers, strict=True))
+    return [found[k] for k in range(len(found))], [left[place] for place in conforming]
 
 
 def _told_by_hulls(
@@ -141,8 +157,9 @@ def prove_way(
     if (q == last).all():
         # Nothing has moved: there is no way, and the poses were looked at before.
         return prove_start(packed, bodies, state, touching)
-    # A way begins where all are clear. Hulls tell at once of what touches; a look would spend its budget there.
-    if not may_jump and hull_answers(packed, bodies, last, length).any_touches():
+    # A way leads from where all are clear to where they still are. Hulls tell at once of what touches; a look, for
+    # which cells are made, would spend its budget there.
+    if not may_jump and any(hull_answers(packed, bodies, at, length).any_touches() for at in (last, q)):
         return None
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(length)

@@ -25,7 +25,14 @@ from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
 from assembly.proximity.clearance.hulls.planes import normal_between
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.solve.clearance_proof import answers_at, can_prove, lent_proof, open_recognized
+from assembly.solve.clearance_proof import (
+    answers_at,
+    can_prove,
+    hull_answers,
+    lent_proof,
+    open_recognized,
+    owned_pairs,
+)
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import CONTACT_LOST, SOLVED
 from assembly.solve.options import Options
@@ -58,14 +65,15 @@ class PutTogether:
     keeps_topology : bool
         Whether bodies are clear at the start, but not all parted by planes, so that other ways come first.
     is_asked : bool
-        Whether constraints do not hold at the start; otherwise only an objective draws bodies together.
+        Whether constraints do not hold at the start; otherwise only an objective draws bodies together, which alone has
+        to keep them on their sides.
     """
 
     def __init__(
-        self, is_clear: bool, sides: list[Array | None], is_asked: bool, solve: Callable[[], There | None]
+        self, keeps_topology: bool, sides: list[Array | None], is_asked: bool, solve: Callable[[], There | None]
     ) -> None:
-        self.keeps_topology = is_clear and any(side is None for side in sides)
-        self.is_asked, self._sides, self._solve = is_asked, sides, solve
+        self.keeps_topology, self.is_asked = keeps_topology, is_asked
+        self._sides, self._solve = sides, solve
 
     @cached_property
     def there(self) -> There | None:
@@ -138,16 +146,6 @@ def put_together(
     if not (is_asked or scene.objectives) or interruption.is_over():
         return None
     touching = settings.touching * packed.scale
-    answers = answers_at(packed, scene.bodies, q, touching)
-    is_clear = not any(is_stuck(answer, touching) for answer in answers)
-    # Of bodies that cross only those are asked for sides that an objective alone draws together.
-    sides: list[Array | None] = [None] * len(answers)
-    if is_clear or not is_asked:
-        with lent_proof(packed, scene.bodies) as proof:
-            open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
-            is_clear = is_clear and not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)
-            if is_clear or not is_asked:
-                sides = _sides(proof, q)
 
     def solve() -> There | None:
         if alone.code == SOLVED:
@@ -157,4 +155,37 @@ def put_together(
         solution = scene._part(False, True)._from_start(q, starts, options, interruption)
         return There(solution.q.copy(), None) if solution.success else None
 
-    return PutTogether(is_clear, sides, is_asked, solve)
+    if is_asked:
+        return PutTogether(_is_clear_but_not_parted(scene, q, touching), [], True, solve)
+    with lent_proof(packed, scene.bodies) as proof:
+        sides = _sides(proof, q)
+    keeps_topology = any(side is None for side in sides) and _is_clear(scene, q, touching)
+    return PutTogether(keeps_topology, sides, False, solve)
+
+
+def _is_clear_but_not_parted(scene: Assembly, q: Array, touching: float) -> bool:
+    """Whether no bodies cross at poses (n, 7), and some are parted by no plane.
+
+    Hulls tell it of most bodies, and where one pair crosses no other one is asked.
+    """
+    packed = scene.packed()
+    hulls = hull_answers(packed, scene.bodies, q, touching)
+    if hulls.any_crosses() or not _is_clear(scene, q, touching):
+        return False
+    if all(hulls.parted(k) for k in range(len(owned_pairs(packed)))):
+        return False
+    with lent_proof(packed, scene.bodies) as proof:
+        return any(side is None for side in _sides(proof, q))
+
+
+def _is_clear(scene: Assembly, q: Array, touching: float) -> bool:
+    """Whether no bodies are told to cross at poses (n, 7), or are equal and in one place."""
+    packed = scene.packed()
+    answers = answers_at(packed, scene.bodies, q, touching)
+    if any(is_stuck(answer, touching) for answer in answers):
+        return False
+    open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
+    if not open_yet:
+        return True
+    with lent_proof(packed, scene.bodies) as proof:
+        return not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)

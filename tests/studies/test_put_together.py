@@ -82,6 +82,14 @@ def test_exploded_parts_with_joints_are_put_together(cases):
     assert np.array_equal(scene.solve().q, solution.q)
 
 
+def test_where_parts_touch_in_the_end_no_way_there_is_sought():
+    """A way ends where all are clear: cells were made to look for it, and for planes between the parts."""
+    scene = bolted()
+    solution = scene.solve()
+    assert solution.success and solution.put_together and solution.proved
+    assert not scene.packed().proofs
+
+
 def test_what_holds_is_returned_as_it_is():
     scene = bolted()
     home = scene.solve()

@@ -13,7 +13,9 @@ import pytest
 
 import assembly as asm
 from assembly.geometry.shapes.plane_curves import circle
+from assembly.proximity.clearance.forest import PackedForest
 from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.solve.clearance_proof import answers_at, owned_pairs
 from assembly.solve.interruption import CTRL_C
 from assembly.studies.first_solve import first_solve
 from tests.studies.machined import bolt, socket
@@ -257,7 +259,12 @@ def test_only_pairs_of_which_hulls_do_not_tell_are_looked_at(monkeypatch):
         asm.Body("arch", arch, position=(0, 0, 12)),
         asm.Body("block", asm.shapes.box(10, 10, 10), position=(20, 20, 10)),
     ]
-    scene, looked, look = asm.Assembly(bodies), set(), ClearanceProof.look
+    scene, looked, look, celled, forest = asm.Assembly(bodies), set(), ClearanceProof.look, [], PackedForest.__init__
+
+    def made(trees, shapes):
+        celled.append(len(shapes))
+        forest(trees, shapes)
+
     scene.constrain(asm.Clearance())
 
     def seen(proof, q, touching, moves=None, which=None, *args, **more):
@@ -267,6 +274,18 @@ def test_only_pairs_of_which_hulls_do_not_tell_are_looked_at(monkeypatch):
     # Planes along the pin through corners of the arch's hulls would tell of these two as well.
     monkeypatch.setattr("assembly.proximity.clearance.hulls.pair.BESIDE", 0)
     monkeypatch.setattr(ClearanceProof, "look", seen)
+    monkeypatch.setattr(PackedForest, "__init__", made)
     solution = scene.solve()
     assert solution.iterations == 0 and solution.proved
     assert looked == {(1, 2)} or looked == {(2, 1)}
+    # Cells were made of all bodies.
+    assert celled == [2]
+    assert [pair.bodies for pair in solution._clear] == [
+        (a.name, b.name) for _, (a, b), _ in owned_pairs(scene.packed())
+    ]
+    # Whoever asks again at the same poses finds what was looked at.
+    touching = 1e-6
+    first = answers_at(scene.packed(), scene.bodies, solution.q, touching)
+    looked.clear()
+    assert answers_at(scene.packed(), scene.bodies, solution.q, touching) == first
+    assert not looked and celled == [2, 2]

@@ -110,8 +110,18 @@ class Border:
         for k, curve in enumerate(self.face.boundary):
             own = np.flatnonzero(curves == k)
             if len(own):
-                points[own] = curve.evaluate(t[own])
+                points[own] = curve.evaluate(t[own]) + self._turned(rows[own], curve)
         return points
+
+    def _turned(self, rows: Indices, curve: NurbsCurve) -> Array:
+        """By how many whole periods segments (n) of a curve stand beside it, as lengths (n, 2) in (u, v)."""
+        surface, turned = self.face.surface, np.zeros((len(rows), 2))
+        if any(surface.closed):
+            off = self.ends[rows, 0] - curve.evaluate(self.t[rows, 0])
+            for d in np.flatnonzero(surface.closed):
+                period = np.ptp(surface.domain[d])
+                turned[:, d] = period * np.round(off[:, d] / period)
+        return turned
 
     def split(self, rows: Indices, t: Array | None = None) -> Border:
         """The border with segments cut in two, in the middle or at given parameters; each at most once."""

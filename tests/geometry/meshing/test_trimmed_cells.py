@@ -84,3 +84,23 @@ def test_triangles_beside_an_apex_cover_the_face():
     a, b = cells.parameters[:, 1] - cells.parameters[:, 0], cells.parameters[:, 2] - cells.parameters[:, 0]
     (u0, u1), (v0, v1) = face.surface.domain
     assert 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() == pytest.approx((u1 - u0) * (v1 - v0), rel=1e-9)
+
+
+@pytest.mark.parametrize("center", [0.0, 0.3, 2.0 * np.pi])
+def test_chords_beyond_a_seam_are_cut_where_they_stand(center):
+    """A hole across the seam of a cylinder is laid out in parts, some of them a period from their curve."""
+    hole = asm.curves.circle(0.5, (center, 4.0)).reversed()
+    face = asm.Face(asm.shapes.cylinder(1.0, 8.0), None, [hole])
+    made = TrimmedCells(face, TOLERANCE, ANGLE)
+    left = []
+    for _ in range(3):
+        cells = made.made()
+        of_hole = (np.abs(cells.border.ends[..., 1] - 4.0) < 1.0).all(axis=1)
+        chords = np.ptp(cells.border.ends[of_hole], axis=1)
+        a, b = cells.parameters[:, 1] - cells.parameters[:, 0], cells.parameters[:, 2] - cells.parameters[:, 0]
+        left.append(0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        assert chords.max() < 0.5
+        made.cut(np.arange(len(cells.border.curve)))
+    # Chords of the hole are within it, and come nearer to it.
+    missing = np.array(left) - (16.0 * np.pi - 0.25 * np.pi)
+    assert (missing > 0.0).all() and (missing[1:] < 0.3 * missing[:-1]).all()

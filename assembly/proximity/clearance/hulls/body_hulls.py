@@ -11,6 +11,7 @@ that a cylinder, a cone, a ball or a torus is made of. It reaches no farther tha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
@@ -23,7 +24,7 @@ from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
-from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, ForBalls, Hollow
+from assembly.proximity.clearance.hulls.hollows import AnyHollow, FaceHulls, ForBalls, Hollow, depths_within
 from assembly.proximity.clearance.hulls.pockets import bent_wall
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
@@ -81,16 +82,25 @@ class BodyHulls:
         rows = self.discs.reach(normals)
         return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
 
-    def within(self, hollow: AnyHollow) -> Array:
-        """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
-        if isinstance(hollow, ForBalls):
-            rows = np.full((1, len(self.discs.radii)), -np.inf)
-            rows[0, self.is_ball] = hollow.depth_of(self.discs.centers[self.is_ball])
-        else:
-            # Of each side of a prism another one of a face's hulls may tell.
-            rows = hollow.depths(self.discs) if isinstance(hollow, Prism) else hollow.depth(self.discs)[None]
-        of_hulls = np.minimum.reduceat(rows, self.first, axis=1) - self.pad
-        return np.asarray(np.maximum.reduceat(of_hulls, self.of_face, axis=1).min(axis=0))
+    def within(self, hollows: Sequence[AnyHollow]) -> Array:
+        """How far faces are from the borders of hollows that they are within, at least: (h, f); below zero outside."""
+        found = np.empty((len(hollows), len(self.of_face)))
+        plain = [k for k, hollow in enumerate(hollows) if isinstance(hollow, Hollow)]
+        found[plain] = self._of_faces(depths_within([hollows[k] for k in plain], self.discs))
+        for k, hollow in enumerate(hollows):
+            if isinstance(hollow, ForBalls):
+                rows = np.full((1, len(self.discs.radii)), -np.inf)
+                rows[0, self.is_ball] = hollow.depth_of(self.discs.centers[self.is_ball])
+                found[k] = self._of_faces(rows)
+            elif isinstance(hollow, Prism):
+                # Of each side another one of a face's hulls may tell.
+                found[k] = self._of_faces(hollow.depths(self.discs)).min(axis=0)
+        return found
+
+    def _of_faces(self, depths: Array) -> Array:
+        """Of depths of discs (n, m) those of faces (n, f): of the hull that is deepest, where it is least deep."""
+        of_hulls = np.minimum.reduceat(depths, self.first, axis=1) - self.pad
+        return np.asarray(np.maximum.reduceat(of_hulls, self.of_face, axis=1))
 
     def discs_of(self, face: int) -> Discs:
         """The discs and points of all hulls of a face."""

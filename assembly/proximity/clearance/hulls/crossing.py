@@ -20,7 +20,8 @@ from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
-from assembly.proximity.clearance.hulls.hollows import ForBalls
+from assembly.proximity.clearance.hulls.discs import Discs
+from assembly.proximity.clearance.hulls.hollows import ForBalls, depths_within
 
 __all__ = ["Marked", "crossing_by_hulls", "marked"]
 
@@ -140,9 +141,10 @@ def _depths(hulls: BodyHulls, points: Array, normals: Array, reach: Array) -> Ar
     """How far points (p, 3) are beyond every face along directions, and in its hollows: (p, f, k + most hollows)."""
     along = (points @ normals.T)[:, None] - reach
     hollows: list[list[Array]] = [[] for _ in reach]
-    for face, hollow in hulls.hollows:
-        if not isinstance(hollow, ForBalls):
-            hollows[face].append(hollow.depth_of(points))
+    convex = [(face, hollow) for face, hollow in hulls.hollows if not isinstance(hollow, ForBalls)]
+    depths = depths_within([hollow for _, hollow in convex], Discs.of_points(points))
+    for (face, _), depth in zip(convex, depths, strict=True):
+        hollows[face].append(depth)
     columns = np.full((len(points), len(reach), max((len(own) for own in hollows), default=0)), -np.inf)
     for face, own in enumerate(hollows):
         for column, depth in enumerate(own):

@@ -13,7 +13,7 @@ from assembly.proximity.clearance.hulls.discs import Discs
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.clearance.hulls.sheet import Sheet
 
-__all__ = ["AnyHollow", "FaceHulls", "ForBalls", "Hollow", "Ring", "Tube", "parts_of_one"]
+__all__ = ["AnyHollow", "FaceHulls", "ForBalls", "Hollow", "Ring", "Tube", "depths_within", "parts_of_one"]
 
 Array = NDArray[np.float64]
 # [radii] A point so near to an axis is on it: rounding decides where it is seen from there.
@@ -47,21 +47,13 @@ class Hollow(NamedTuple):
 
     def depth(self, discs: Discs) -> Array:
         """How far discs (m,) are within, at least; below zero where they may not be."""
+        return _depths_in_round([self], discs)[0] if self.axis.any() else self._depth_in_ball(discs)
+
+    def _depth_in_ball(self, discs: Discs) -> Array:
         away = discs.centers - self.center
-        if not self.axis.any():
-            height = (away * discs.axes).sum(axis=1)
-            beside = np.sqrt(((away - height[:, None] * discs.axes) ** 2).sum(axis=1))
-            return np.asarray(self.radius - np.hypot(beside + discs.radii, height))
-        height = away @ self.axis
-        off = away - height[:, None] * self.axis
-        beside = np.sqrt((off**2).sum(axis=1))
-        lean = discs.axes - (discs.axes @ self.axis)[:, None] * self.axis
-        lowest = height - discs.radii * np.sqrt((lean**2).sum(axis=1))
-        # A disc whose axis leads away from this one is nowhere farther off than by its radius across.
-        sideways = np.sqrt(((off - (off * discs.axes).sum(axis=1)[:, None] * discs.axes) ** 2).sum(axis=1))
-        farthest = np.sqrt(beside**2 + (2.0 * sideways + discs.radii) * discs.radii)
-        inside = (self.radius - farthest) * cos(self.slope)
-        return np.asarray(inside + lowest * sin(self.slope))
+        height = (away * discs.axes).sum(axis=1)
+        beside = np.sqrt(((away - height[:, None] * discs.axes) ** 2).sum(axis=1))
+        return np.asarray(self.radius - np.hypot(beside + discs.radii, height))
 
     def depth_of(self, points: Array) -> Array:
         """How far points (m, 3) are within."""
@@ -225,6 +217,39 @@ class Ring(NamedTuple):
     def scaled(self, left: float, shift: Array) -> Ring:
         """The same after x -> left x + shift."""
         return self._replace(center=left * self.center + shift, ends=left * self.ends, off=left * self.off)
+
+
+def depths_within(hollows: Sequence[AnyHollow], discs: Discs) -> Array:
+    """Of every hollow how far discs (m,) are within, at least: (h, m); cylinders and cones are asked at once."""
+    found = np.empty((len(hollows), len(discs.radii)))
+    axes = np.array([hollow.axis for hollow in hollows]).reshape(-1, 3)
+    both = zip(hollows, np.count_nonzero(axes, axis=1).tolist(), strict=True)
+    some = {k: hollow for k, (hollow, parts) in enumerate(both) if parts and isinstance(hollow, Hollow)}
+    if some:
+        found[list(some)] = _depths_in_round(list(some.values()), discs)
+    for k, hollow in enumerate(hollows):
+        if k not in some:
+            found[k] = hollow.depth(discs)
+    return found
+
+
+def _depths_in_round(hollows: Sequence[Hollow], discs: Discs) -> Array:
+    """Of every cylinder or cone how far discs (m,) are within, at least: (h, m)."""
+    center, axis = (np.array([hollow[k] for hollow in hollows])[:, None] for k in range(2))
+    radius, slope = (np.array([hollow[k] for hollow in hollows])[:, None] for k in range(2, 4))
+    away = discs.centers - center
+    height = (away @ axis[:, 0, :, None])[..., 0]
+    off = away - height[..., None] * axis
+    square = np.einsum("hmi,hmi->hm", off, off)
+    (wide,) = np.nonzero(discs.radii)
+    if len(wide):
+        axes, radii, off = discs.axes[wide], discs.radii[wide], off[:, wide]
+        lean = axes - (axes @ axis[:, 0, :, None]) * axis
+        height[:, wide] -= radii * np.sqrt(np.einsum("hmi,hmi->hm", lean, lean))
+        # A disc whose axis leads away from this one is nowhere farther off than by its radius across.
+        across = off - np.einsum("hmi,mi->hm", off, axes)[..., None] * axes
+        square[:, wide] += (2.0 * np.sqrt(np.einsum("hmi,hmi->hm", across, across)) + radii) * radii
+    return np.asarray((radius - np.sqrt(square)) * np.cos(slope) + height * np.sin(slope))
 
 
 def _around(axis: Array, first: Array, count: int = 12) -> Array:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls
+from assembly.proximity.clearance.hulls.discs import Discs
+from assembly.proximity.clearance.hulls.hollows import depths_within
 
 __all__ = ["is_outside"]
 
@@ -46,14 +48,16 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
     # Of every point, face and half line, whether it does not meet the face.
     misses = np.zeros(beyond.shape, dtype=bool)
     misses[beyond @ leads > 0.0] = True
-    for face, hollow in other.hollows:
-        if hollow.axis.any():
-            inside = hollow.depth_of(body.points) > rounding
-            along = normals @ hollow.axis
-            leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
-            if hollow.is_one_sided:
-                leads_along &= along > 0.0
-            misses[:, face] |= inside[:, None] & leads_along
+    axes = np.array([hollow.axis for _, hollow in other.hollows]).reshape(-1, 3)
+    open_ended = [other.hollows[k] for k in np.flatnonzero(axes.any(axis=1))]
+    inside = depths_within([hollow for _, hollow in open_ended], Discs.of_points(body.points)) > rounding
+    for k in np.flatnonzero(inside.any(axis=1)).tolist():
+        face, hollow = open_ended[k]
+        along = normals @ hollow.axis
+        leads_along = ((normals - along[:, None] * hollow.axis) ** 2).sum(axis=1) <= ALONG**2
+        if hollow.is_one_sided:
+            leads_along &= along > 0.0
+        misses[:, face] |= inside[k, :, None] & leads_along
     leaves = np.zeros(len(body.of_face), dtype=bool)
     # The points of which a half line misses all faces.
     free, _ = np.nonzero(np.asarray(misses.all(axis=1)))

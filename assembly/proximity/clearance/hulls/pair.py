@@ -14,6 +14,7 @@ slot, a plug in its seat and a ball in its socket touch, as do flat faces that l
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -85,24 +86,29 @@ class _Gaps:
         """How many directions for two faces there are to try."""
         return len(self.near_a) * len(self.near_b) * len(self.normals)
 
+    @cached_property
     def of_faces(self) -> tuple[Array, Table, Array, Table]:
         """Gaps (m, n) of near faces by planes, and the normals; by hollows, and the numbers of these among all."""
         gaps = self.low_b[self.near_b] - self.reach_a[self.near_a, None]
         best = gaps.argmax(axis=2)
         by_plane = np.take_along_axis(gaps, best[..., None], axis=2)[..., 0]
         by_hollow, which = np.full(by_plane.shape, -np.inf), np.full(by_plane.shape, -1)
-        count = len(self.a.hollows)
-        places = [{int(face): place for place, face in enumerate(near)} for near in (self.near_a, self.near_b)]
-        for number, (face, hollow) in enumerate((*self.a.hollows, *self.b.hollows)):
-            others, place = (self.b, places[0].get(face)) if number < count else (self.a, places[1].get(face))
-            if place is None:
-                continue
-            depth = others.within(hollow)[self.near_b if number < count else self.near_a]
-            row = by_hollow[place] if number < count else by_hollow[:, place]
-            found = which[place] if number < count else which[:, place]
-            # What touches a face from within the body is in no contact with it.
-            better = (depth > row) & (hollow.is_wall | (depth > self.inside))
-            row[better], found[better] = depth[better], number
+        sides = (
+            (0, self.a, self.b, self.near_a, self.near_b, by_hollow, which),
+            (len(self.a.hollows), self.b, self.a, self.near_b, self.near_a, by_hollow.T, which.T),
+        )
+        for first, one, others, near, near_others, rows, numbers in sides:
+            place = {face: k for k, face in enumerate(near.tolist())}
+            asked = [
+                (place[face], number, hollow)
+                for number, (face, hollow) in enumerate(one.hollows, first)
+                if face in place
+            ]
+            depths = others.within([hollow for _, _, hollow in asked])[:, near_others]
+            for (at, number, hollow), depth in zip(asked, depths, strict=True):
+                # What touches a face from within the body is in no contact with it.
+                better = (depth > rows[at]) & (hollow.is_wall | (depth > self.inside))
+                rows[at, better], numbers[at, better] = depth[better], number
         return by_plane, best, by_hollow, which
 
     def scaled(self, part: float, shift: Array) -> _Gaps:
@@ -125,7 +131,7 @@ class _Gaps:
             gap is above another length.
         """
         gaps = self.low_b[self.near_b] - self.reach_a[self.near_a, None]
-        by_plane, best, by_hollow, which = self.of_faces()
+        by_plane, best, by_hollow, which = self.of_faces
         single: list[_Contact] = []
         several: list[_Contact] = []
         for i, j in np.argwhere(np.maximum(by_plane, by_hollow) < below).tolist():
@@ -198,7 +204,7 @@ def answer_by_hulls(a: BodyHulls, b: BodyHulls, least: float, touching: float) -
 
 def _bound(gaps: _Gaps) -> float:
     """The least gap of faces that are near, infinite where none are."""
-    by_plane, _, by_hollow, _ = gaps.of_faces()
+    by_plane, _, by_hollow, _ = gaps.of_faces
     return float(np.maximum(by_plane, by_hollow).min(initial=np.inf))
 
 
@@ -207,7 +213,7 @@ def _tangents(gaps: _Gaps, below: float) -> Array:
 
     So the flank of a slot, whose edge lies on a shaft, is parted from that. None where there are many such faces.
     """
-    by_plane, _, by_hollow, _ = gaps.of_faces()
+    by_plane, _, by_hollow, _ = gaps.of_faces
     pairs = np.argwhere(np.maximum(by_plane, by_hollow) < below)
     ways = [np.empty((0, 3))]
     for i, j in pairs.tolist() if len(pairs) <= BESIDE else ():
@@ -232,10 +238,12 @@ def _are_apart(gaps: _Gaps, bound: float, rounding: float) -> bool:
 
 def _opened(gaps: _Gaps, least: float, touching: float, rounding: float) -> Answer | None:
     """What is told of bodies the second of which is scaled and shifted, so that its contacts open."""
+    single, several = gaps.contacts(least + touching, least - touching)
+    asked = single or several[:1]
     for columns in (3, 4):
         for part in OPENED:
             wanted = least + part * touching
-            answer, is_possible = _opened_by(gaps, (least, wanted, touching), rounding, columns)
+            answer, is_possible = _opened_by(gaps, asked, (least, wanted, touching), rounding, columns)
             if answer is not None:
                 return answer
             if not is_possible:
@@ -244,17 +252,15 @@ def _opened(gaps: _Gaps, least: float, touching: float, rounding: float) -> Answ
 
 
 def _opened_by(
-    gaps: _Gaps, lengths: tuple[float, float, float], rounding: float, columns: int
+    gaps: _Gaps, asked: list[_Contact], lengths: tuple[float, float, float], rounding: float, columns: int
 ) -> tuple[Answer | None, bool]:
-    """The same for gaps that are to be so large; and whether smaller ones might be reached where these are not.
+    """The same for gaps of contacts that are to be so large; and whether smaller ones might be reached where not.
 
     Faces that more than one direction opens may go either way: they follow where the others lead them, and are asked
     for as long as they are not open.
     """
     least, wanted, touching = lengths
     middle, radius = gaps.b.ball
-    single, several = gaps.contacts(least + touching, least - touching)
-    asked, other = single or several[:1], gaps
     change = np.zeros(4)
     for _ in range(ROUNDS):
         normals = np.array([contact.normal for contact in asked])

@@ -15,6 +15,7 @@ from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body, with_pockets
 from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
+from assembly.proximity.clearance.hulls.planes import normal_between
 
 __all__ = ["HullAnswers"]
 
@@ -39,7 +40,13 @@ class HullAnswers:
     is_silent : bool
         Whether nothing is told of any pair.
     last : HullAnswers, optional
-        Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here.
+        Of the same shapes, pairs and lengths at other poses: what is known of pairs of bodies that stay is so here, and
+        by so much less of those that have moved by rounding.
+
+    Attributes
+    ----------
+    looked : dict of int to Answer, optional
+        What looks have told of the other pairs, by their numbers, once somebody has asked.
     """
 
     def __init__(
@@ -54,12 +61,34 @@ class HullAnswers:
     ) -> None:
         self._shapes, self._pairs, self._minimum = shapes, pairs, minimum
         self._q, self._touching, self._is_silent = q, touching, is_silent
+        self.looked: dict[int, Answer] | None = None
         self._held: dict[int, Answer | None] = {}
         self._crossings: dict[int, Answer | None] = {}
         if last is not None:
-            stayed = {k for k, pair in enumerate(pairs) if (q[[*pair]] == last._q[[*pair]]).all()}
-            for mine, theirs in ((self._held, last._held), (self._crossings, last._crossings)):
-                mine.update((k, answer) for k, answer in [*theirs.items()] if k in stayed)
+            self._take_from(last)
+
+    def _take_from(self, last: HullAnswers) -> None:
+        """Take what is known of pairs of bodies that have stayed, or have moved by no more than rounding."""
+        way = np.where((self._q == last._q).all(axis=1), 0.0, np.inf)
+        for body in () if self._is_silent else self._hulls:
+            if way[body] > 0.0:
+                way[body] = self._rounded_way(last, body)
+        for k, (one, other) in enumerate(self._pairs):
+            by = float(way[one] + way[other])
+            if by == 0.0:
+                for mine, theirs in ((self._held, last._held), (self._crossings, last._crossings)):
+                    mine.update({k: theirs[k]} if k in theirs else {})
+            elif by < np.inf:
+                found = _after_a_move(last._held.get(k), by, float(self._minimum[k]), self._touching)
+                self._held.update({} if found is None else {k: found})
+
+    def _rounded_way(self, last: HullAnswers, body: int) -> float:
+        """How far points of a body have gone at most, infinite where that is more than rounding."""
+        center, radius = self._hulls[body].ball
+        extent = float(np.linalg.norm(center)) + radius
+        shift, turn = np.split(self._q[body] - last._q[body], [3])
+        way = float(np.linalg.norm(shift) + 2.0 * np.linalg.norm(turn) * extent)
+        return way if way <= ROUNDING * (float(np.linalg.norm(self._q[body, :3])) + extent) else np.inf
 
     def held(self, k: int) -> Answer | None:
         """That a pair is clear or touches, or None where hulls do not tell it."""
@@ -77,9 +106,19 @@ class HullAnswers:
         """That all pairs are clear or touch, or None at the first of which hulls do not tell it."""
         return _all(self.held(k) for k in range(len(self._pairs)))
 
-    def all_told(self) -> list[Answer] | None:
-        """What all pairs are, those that cross as well, or None at the first of which hulls do not tell it."""
-        return _all(self.held(k) or self.crossing(k) for k in range(len(self._pairs)))
+    def told_or_crossing(self) -> dict[int, Answer]:
+        """The pairs that are told to be clear, to touch or to cross, by their numbers."""
+        answers = ((k, self.held(k) or self.crossing(k)) for k in range(len(self._pairs)))
+        return {k: answer for k, answer in answers if answer is not None}
+
+    def parted(self, k: int) -> bool:
+        """Whether a plane is told to be between the bodies of a pair."""
+        if self._is_silent:
+            return False
+        if self._apart[k] > 0.0:
+            return True
+        one, other = self._pairs[k]
+        return normal_between(self._hulls[one], self._hulls[other].posed(*self._relative(k))) is not None
 
     def told(self) -> dict[int, Answer]:
         """The pairs that are told to be clear or to touch, by their numbers."""
@@ -88,9 +127,11 @@ class HullAnswers:
 
     def any_touches(self) -> bool:
         """Whether any pair is told to touch or to cross: then not all are clear."""
-        pairs = range(len(self._pairs))
-        held = (answer for k in pairs if (answer := self.held(k)) is not None)
-        return any(answer.verdict is not Verdict.CLEAR for answer in held) or self.any_crosses()
+        return any(self._touches(k) for k in range(len(self._pairs)))
+
+    def _touches(self, k: int) -> bool:
+        held = self.held(k)
+        return self.crossing(k) is not None if held is None else held.verdict is not Verdict.CLEAR
 
     def any_crosses(self) -> bool:
         """Whether any pair is told to cross."""
@@ -150,6 +191,17 @@ class HullAnswers:
             return None
         found = crossing_by_hulls((self._shapes[one], self._shapes[other]), *self._relative(k), self._touching)
         return found and replace(found, place=self._turns[one] @ found.place + self._q[one, :3])
+
+
+def _after_a_move(answer: Answer | None, by: float, least: float, touching: float) -> Answer | None:
+    """What an answer that a pair holds is worth after a move of its bodies by a length; None where it is nothing."""
+    if answer is None:
+        return None
+    bound, depth = answer.bound - by, answer.depth
+    if answer.verdict is Verdict.CLEAR:
+        return replace(answer, bound=bound) if bound > least else None
+    # What is taken so far to be clear is taken back by that much, too.
+    return replace(answer, bound=bound, depth=depth + by) if depth + by <= touching else None
 
 
 def _all(answers: Iterator[Answer | None]) -> list[Answer] | None:

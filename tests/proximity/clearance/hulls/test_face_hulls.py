@@ -10,7 +10,7 @@ import assembly as asm
 from assembly.geometry.shapes.plane_curves import circle
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.discs import Discs
-from assembly.proximity.clearance.hulls.hollows import Hollow, Ring, Tube
+from assembly.proximity.clearance.hulls.hollows import Hollow, Ring, Tube, depths_within
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.clearance.hulls.sheet import Sheet
 from assembly.proximity.clearance.hulls.triangles import triangles_of
@@ -212,6 +212,24 @@ def test_depths_of_discs_are_bounds(hollow):
             inside += 1
             assert (rim @ inward.T >= borders - 1e-12).all()
     assert inside > 5
+
+
+def test_depths_in_several_hollows_are_those_in_each():
+    """Cylinders and cones are asked at once; the others, and points, stay where they are among them."""
+    rng = np.random.default_rng(4)
+    cylinder, cone = (Hollow(rng.normal(size=3), direction(rng), 2.0, slope) for slope in (0.0, 0.6))
+    ball = Hollow(rng.normal(size=3), np.zeros(3), 2.5)
+    prism = Prism(direction(rng), np.array([direction(rng) for _ in range(3)]), np.full(3, -2.0))
+    tube = Tube(rng.normal(size=3), direction(rng), 2.0, 0.6, True, True)
+    hollows = [cylinder, ball, cone, prism, cylinder, tube]
+    axes, radii = np.array([direction(rng) for _ in range(20)]), rng.uniform(0.1, 0.8, 20)
+    axes[::3] = radii[::3] = 0.0
+    discs = Discs(rng.normal(size=(20, 3)), axes, radii)
+    found = depths_within(hollows, discs)
+    for row, hollow in zip(found, hollows, strict=True):
+        one_by_one = [hollow.depth(Discs(*(column[k : k + 1] for column in discs)))[0] for k in range(20)]
+        np.testing.assert_allclose(row, one_by_one, rtol=0, atol=1e-14)
+    assert depths_within([], discs).shape == (0, 20)
 
 
 @pytest.mark.parametrize("outside", [True, False])

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.geometry.shapes.plane_curves import circle
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls import outside, pair
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.pair import answer_by_hulls
-from assembly.proximity.clearance.hulls.scene import HullAnswers
+from assembly.proximity.clearance.hulls.scene import HullAnswers, _after_a_move
 from tests.proximity.clearance.hulls.test_face_hulls import GROOVE, polygon, square_hole
 from tests.proximity.clearance.scenes import at, faces_of, poses, proof_of, start_of
 from tests.studies.machined import bolt, retaining_ring, socket, turned_part
@@ -294,3 +294,60 @@ def test_what_is_known_of_bodies_that_stay_is_what_is_told_of_them_anew():
     for k in range(5):
         assert repr(later.held(k)) == repr(anew.held(k)) and repr(later.crossing(k)) == repr(anew.crossing(k))
     assert later.held(1).bound > first.held(1).bound
+
+
+@pytest.mark.parametrize(
+    ("at", "touches", "parted"),
+    [((40, 0, 0), False, True), ((20, 0, 0), True, False), ((15, 0, 0), True, False), ((0, 0, 22), False, False)],
+    ids=["beside", "flush", "crossing", "in its hole"],
+)
+def test_what_touches_or_is_parted_by_a_plane(at, touches, parted):
+    plate = faces_of(asm.shapes.plate(30, 30, 10, [(0, 0, 4.5)]))
+    pin = faces_of(asm.shapes.box(10, 10, 10) if at[0] else asm.shapes.solid_cylinder(4.0, 60))
+    q = np.tile([0.0, 0, 0, 1, 0, 0, 0], (2, 1))
+    q[1, :3] = at
+    answers = HullAnswers([plate, pin], [(0, 1)], [0.0], q, TOUCHING)
+    assert answers.any_touches() == touches
+    assert answers.parted(0) == parted
+    # Of wires nothing is told.
+    assert not HullAnswers([plate, pin], [(0, 1)], [0.0], q, TOUCHING, True).parted(0)
+
+
+@pytest.mark.parametrize("beside", [(5.0, 3.0, 10.0), (5.0, 3.0, 12.0)], ids=["touching", "clear"])
+def test_what_moves_by_rounding_is_not_asked_again(beside, monkeypatch):
+    """Its answer is worth less by at least how far its points have gone; what moves farther is asked."""
+    rng, shapes, asked = np.random.default_rng(5), [faces_of(PLATE)] * 3, []
+    q = np.array([at(10, 20, 30), at(*np.add((10, 20, 30), beside)), at(10, 20, 90)])
+    pairs = [(0, 1), (0, 2), (1, 2)]
+    first = HullAnswers(shapes, pairs, [0.0] * 3, q, TOUCHING)
+    before = first.all_held()
+
+    def seen(*given):
+        asked.append(given)
+        return answer_by_hulls(*given)
+
+    monkeypatch.setattr("assembly.proximity.clearance.hulls.scene.answer_by_hulls", seen)
+    for _ in range(20):
+        moved = q.copy()
+        moved[1] += rng.uniform(-1.0, 1.0, 7) * np.r_[np.full(3, 8e-15), np.full(4, 1e-16)]
+        after = HullAnswers(shapes, pairs, [0.0] * 3, moved, TOUCHING, last=first).all_held()
+        assert not asked
+        went = float(np.linalg.norm(moved[1, :3] - q[1, :3]))
+        for k in (0, 2):
+            assert after[k].verdict is before[k].verdict
+            assert before[k].bound - after[k].bound >= went - 1e-15
+            assert after[k].depth >= before[k].depth
+        assert after[1] is before[1]
+    moved[1, 2] += 1e-10
+    HullAnswers(shapes, pairs, [0.0] * 3, moved, TOUCHING, last=first).all_held()
+    assert asked
+
+
+def test_what_is_touching_by_all_that_counts_is_asked_again():
+    """A move by rounding takes what touches no farther than what counts as touching, nor below a least gap."""
+    touches, clear = Answer(Verdict.TOUCHING, 0.0, TOUCHING), Answer(Verdict.CLEAR, 0.5)
+    assert _after_a_move(touches, 1e-15, 0.0, TOUCHING) is None
+    assert _after_a_move(touches, 1e-15, 0.0, 2.0 * TOUCHING).depth == TOUCHING + 1e-15
+    assert _after_a_move(clear, 1e-15, 0.5, TOUCHING) is None
+    assert _after_a_move(clear, 1e-15, 0.4, TOUCHING).bound == 0.5 - 1e-15
+    assert _after_a_move(None, 1e-15, 0.0, TOUCHING) is None
