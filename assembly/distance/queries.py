@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.distance.curves.capsules import FARTHER, OPEN
-from assembly.distance.curves.point_curve import UNFINISHED, point_distances
+from assembly.distance.curves.point_curve import UNFINISHED, nearest_address, point_distances
 from assembly.distance.curves.search import ANSWER
 from assembly.distance.operands import checked_operand, dimension, is_formula, is_spline
 from assembly.distance.separation import Separation
@@ -216,7 +216,8 @@ def minimum_distances(
     space = np.zeros((len(rows), 3))
     space[:, :d] = rows
     record, pool = curve._packed_pieces
-    point_distances(record, pool, space, tolerance, budget, codes, out)
+    question = (tolerance, -1.0, budget, True)
+    point_distances(record, pool, space, question, nearest_address(), codes, out)
     for i in np.flatnonzero(codes == UNFINISHED):
-        from_pairs(curve, rows[i], (tolerance, -1.0, budget, True), out[i])
+        from_pairs(curve, rows[i], question, out[i])
     return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()

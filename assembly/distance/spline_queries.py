@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.distance.curves.capsules import OPEN, capsule_tree, compare_curves, compare_point
-from assembly.distance.curves.point_curve import UNFINISHED, point_distance
+from assembly.distance.curves.point_curve import UNFINISHED, nearest_address, point_distance
 from assembly.distance.curves.search import ANSWER, curve_distance
 from assembly.distance.operands import coordinates, is_formula, share_a_point
 from assembly.distance.patches.packing import pack_patches
@@ -89,7 +89,7 @@ def quick_answer(a: Any, b: Any, question: Question, out: Array) -> int:
     if place is None or not question[3]:
         return -1
     record, pool = a._packed_pieces
-    code = int(point_distance(record, pool, place, question, out))
+    code = int(point_distance(record, pool, place, question, nearest_address(), out))
     return code if code != UNFINISHED else from_pairs(a, b, question, out)
 
 
