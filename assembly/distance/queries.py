@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.distance.curves.capsules import FARTHER, OPEN
-from assembly.distance.curves.point_curve import UNFINISHED, nearest_address, point_distances
+from assembly.distance.curves.point_curve import UNFINISHED, point_distances
 from assembly.distance.curves.search import ANSWER
 from assembly.distance.operands import checked_operand, dimension, is_formula, is_spline
 from assembly.distance.separation import Separation
 from assembly.distance.spline_queries import (
     compared,
     from_pairs,
+    nearest_address,
     quick_answer,
     spline_distance,
     surface_distance,

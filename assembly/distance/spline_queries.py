@@ -8,13 +8,15 @@ before that if a clearance is asked about (`capsules.py`); surfaces are searched
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._address import address_of
 from assembly.distance.curves.capsules import OPEN, capsule_tree, compare_curves, compare_point
-from assembly.distance.curves.point_curve import UNFINISHED, nearest_address, point_distance
+from assembly.distance.curves.point_curve import UNFINISHED, nearest_on_curve, point_distance
 from assembly.distance.curves.search import ANSWER, curve_distance
 from assembly.distance.operands import coordinates, is_formula, share_a_point
 from assembly.distance.patches.packing import pack_patches
@@ -29,7 +31,16 @@ from assembly.geometry.splines.surface import NurbsSurface
 if TYPE_CHECKING:
     from assembly.distance.patches.formula_packing import Formula
 
-__all__ = ["compared", "from_pairs", "quick_answer", "spline_distance", "surface_distance", "turned", "written_answer"]
+__all__ = [
+    "compared",
+    "from_pairs",
+    "nearest_address",
+    "quick_answer",
+    "spline_distance",
+    "surface_distance",
+    "turned",
+    "written_answer",
+]
 
 Array = NDArray[np.float64]
 # Tolerance, clearance (below zero: none), budget and polish, as kernels take them.
@@ -73,6 +84,12 @@ def compared(a: Any, b: Any, clearance: float) -> int:
         return int(compare_curves(_capsules(a), _capsules(b), clearance)) if d == b.control_points.shape[1] else OPEN
     place = coordinates(b, d)
     return OPEN if place is None else int(compare_point(_capsules(a), *place, clearance))
+
+
+@cache
+def nearest_address() -> int:
+    """The address of `nearest_on_curve`."""
+    return address_of(nearest_on_curve)
 
 
 def quick_answer(a: Any, b: Any, question: Question, out: Array) -> int:

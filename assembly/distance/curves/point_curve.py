@@ -15,11 +15,10 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from functools import cache
 
 import numpy as np
 
-from assembly._address import address_of, call_address
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._lanes import lane
 from assembly._newton import damped_newton
@@ -310,9 +309,3 @@ def point_distances(record, pool, points, asked, nearest, codes, out):
     for i in range(points.shape[0]):
         point = (points[i, 0], points[i, 1], points[i, 2])
         codes[i] = call_address(nearest, (record, pool, point, asked, work, stack, out[i]))
-
-
-@cache
-def nearest_address() -> int:
-    """The address of `nearest_on_curve`."""
-    return address_of(nearest_on_curve)
