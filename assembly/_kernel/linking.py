@@ -12,6 +12,7 @@ from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+from assembly._kernel.lowering import ENTRY, short_calls
 from assembly._kernel.progress import counted, progress
 from assembly._kernel.shortcuts import needed_passes, nothing_twice
 from assembly._kernel.translation import quick_translation
@@ -142,13 +143,13 @@ class EntryCompiler(Compiler):
     """Numba's compiler, for entries."""
 
     def __init__(self, typing_context: Any, target_context: Any, _library: Any, *rest: Any) -> None:
-        library = _EntryLibrary(target_context.codegen(), "entry")
+        library = _EntryLibrary(target_context.codegen(), ENTRY)
         library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function and all that it calls."""
-        with _nothing_else(), quick_translation(), nothing_twice(), progress(func):
+        with _nothing_else(), quick_translation(), nothing_twice(), short_calls(), progress(func):
             return super().compile_extra(func)
 
 

@@ -10,17 +10,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import CodeType
 from typing import Any
+from weakref import WeakSet
 
-from numba.core import compiler, datamodel, typed_passes, untyped_passes
+from numba.core import base, compiler, datamodel, transforms, typed_passes, untyped_passes
 from numba.core.base import BaseContext
 from numba.core.compiler_machinery import PassManager
+from numba.core.postproc import PostProcessor
 from numba.core.types.functions import BaseFunction
 from numba.core.typing import npydecl
 
+from assembly._kernel.lowering import KernelLowering
+
 __all__ = ["needed_passes", "nothing_twice"]
 
-# Passes that change nothing in a kernel without functions, generators and comprehensions in it, and without arrays of
-# its own; after most of them Numba finds the lifetimes of all variables anew.
+# Passes that change nothing in a plain kernel without arrays of its own; after most of them Numba finds the lifetimes
+# of all variables anew.
 _FOR_OTHERS: tuple[type, ...] = (
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
@@ -38,7 +42,8 @@ _FOR_OTHERS: tuple[type, ...] = (
 
 
 def _is_plain(code: CodeType) -> bool:
-    return not any(isinstance(part, CodeType) for part in code.co_consts)
+    """Whether there are no functions, generators and comprehensions in it, and nothing that catches an error."""
+    return not code.co_exceptiontable and not any(isinstance(part, CodeType) for part in code.co_consts)
 
 
 def needed_passes(state: Any) -> PassManager:
@@ -52,10 +57,25 @@ def needed_passes(state: Any) -> PassManager:
         # Branches are pruned where constants are known, and where variables have one definition each; not in between.
         is_between = made is untyped_passes.DeadBranchPrune and last is untyped_passes.GenericRewrites
         if made not in _FOR_OTHERS and not is_between:
-            short.add_pass(made, said)
+            short.add_pass(KernelLowering if made is typed_passes.NativeLowering else made, said)
             last = made
     short.finalize()
+    _WITHOUT_LIFETIMES.add(state.func_id)
     return short
+
+
+# Functions that `KernelLowering` writes, which asks for nobody's lifetime.
+_WITHOUT_LIFETIMES: WeakSet[Any] = WeakSet()
+
+
+def _finish_blocks(finish: Callable[..., None], processor: Any, *given: Any, **named: Any) -> None:
+    """Bring blocks into Numba's form; it finds the lifetimes of all variables then, five times a function."""
+    function = processor.func_ir
+    if function.func_id in _WITHOUT_LIFETIMES:
+        function.blocks = transforms.canonicalize_cfg(function.blocks)
+        function.generator_info = None
+    else:
+        finish(processor, *given, **named)
 
 
 class _Found:
@@ -67,6 +87,7 @@ class _Found:
         self.packers: dict[Any, Any] = {}
         self.loops: dict[Any, Any] = {}
         self.sizes: dict[str, int] = {}
+        self.asks_where: dict[int, Any] = {}
 
     def refresh(self, context: Any, numba_refreshes: Callable[[Any], None]) -> None:
         """Look for new declarations, which imports and intrinsics bring; Numba looks before every function."""
@@ -107,6 +128,12 @@ class _Found:
             self.loops[key] = find(function, kinds)
         return self.loops[key]
 
+    def has_loc(self, find: Callable[[Any], bool], function: Any) -> bool:
+        """Whether a function that writes code asks where in a source it is for."""
+        if id(function) not in self.asks_where:
+            self.asks_where[id(function)] = find(function), function
+        return bool(self.asks_where[id(function)][0])
+
     def size(self, find: Callable[[Any, Any], int], context: Any, kind: Any) -> int:
         """How many bytes a value of LLVM's takes."""
         name = str(kind)
@@ -121,11 +148,14 @@ def nothing_twice() -> Iterator[None]:
     found = _Found()
     call_type, find_loop = BaseFunction.get_call_type, npydecl.ufunc_find_matching_loop
     refresh, size = BaseContext.refresh, BaseContext.get_abi_sizeof
+    finish, has_loc = PostProcessor.run, base._has_loc
     shortcuts: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
         (BaseFunction, "get_call_type", lambda *given: found.call_type(call_type, *given)),
         (BaseContext, "refresh", lambda context: found.refresh(context, refresh)),
         (BaseContext, "get_arg_packer", lambda context, kinds: found.packer(context, kinds)),
         (BaseContext, "get_abi_sizeof", lambda context, kind: found.size(size, context, kind)),
+        (base, "_has_loc", lambda function: found.has_loc(has_loc, function)),
+        (PostProcessor, "run", lambda *given, **named: _finish_blocks(finish, *given, **named)),
         (npydecl, "ufunc_find_matching_loop", lambda *given: found.loop(find_loop, *given)),
     )
     before = [(where, name, getattr(where, name)) for where, name, _shortcut in shortcuts]

@@ -21,7 +21,7 @@ from numba.core.targetconfig import TargetConfig
 
 from assembly._kernel.sources import PACKAGE
 
-__all__ = ["quick_translation"]
+__all__ = ["quick_translation", "variables_in"]
 
 _DIGEST_LENGTH = 16
 # How a qualified name of this package begins, and that of a place for its environment.
@@ -63,11 +63,15 @@ class _KindOfType(dict[type, int]):
 _KIND_OF_TYPE = _KindOfType()
 
 
-def _list_variables(_instruction: Any, value: Any) -> list[Any]:
+def variables_in(value: Any) -> list[Any]:
     """The variables in a value, in the order in which they stand there."""
     found: list[Any] = []
     _add_variables(value, found)
     return found
+
+
+def _list_variables(_instruction: Any, value: Any) -> list[Any]:
+    return variables_in(value)
 
 
 def _add_variables(value: Any, found: list[Any]) -> None:

@@ -23,6 +23,7 @@ from assembly.distance.separation import Separation
 from assembly.distance.spline_queries import (
     compared,
     from_pairs,
+    nearest_address,
     quick_answer,
     spline_distance,
     surface_distance,
@@ -216,7 +217,8 @@ def minimum_distances(
     space = np.zeros((len(rows), 3))
     space[:, :d] = rows
     record, pool = curve._packed_pieces
-    point_distances(record, pool, space, tolerance, budget, codes, out)
+    question = (tolerance, -1.0, budget, True)
+    point_distances(record, pool, space, question, nearest_address(), codes, out)
     for i in np.flatnonzero(codes == UNFINISHED):
-        from_pairs(curve, rows[i], (tolerance, -1.0, budget, True), out[i])
+        from_pairs(curve, rows[i], question, out[i])
     return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()

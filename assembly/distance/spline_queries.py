@@ -8,13 +8,15 @@ before that if a clearance is asked about (`capsules.py`); surfaces are searched
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._address import address_of
 from assembly.distance.curves.capsules import OPEN, capsule_tree, compare_curves, compare_point
-from assembly.distance.curves.point_curve import UNFINISHED, point_distance
+from assembly.distance.curves.point_curve import UNFINISHED, nearest_on_curve, point_distance
 from assembly.distance.curves.search import ANSWER, curve_distance
 from assembly.distance.operands import coordinates, is_formula, share_a_point
 from assembly.distance.patches.packing import pack_patches
@@ -29,7 +31,16 @@ from assembly.geometry.splines.surface import NurbsSurface
 if TYPE_CHECKING:
     from assembly.distance.patches.formula_packing import Formula
 
-__all__ = ["compared", "from_pairs", "quick_answer", "spline_distance", "surface_distance", "turned", "written_answer"]
+__all__ = [
+    "compared",
+    "from_pairs",
+    "nearest_address",
+    "quick_answer",
+    "spline_distance",
+    "surface_distance",
+    "turned",
+    "written_answer",
+]
 
 Array = NDArray[np.float64]
 # Tolerance, clearance (below zero: none), budget and polish, as kernels take them.
@@ -75,6 +86,12 @@ def compared(a: Any, b: Any, clearance: float) -> int:
     return OPEN if place is None else int(compare_point(_capsules(a), *place, clearance))
 
 
+@cache
+def nearest_address() -> int:
+    """The address of `nearest_on_curve`."""
+    return address_of(nearest_on_curve)
+
+
 def quick_answer(a: Any, b: Any, question: Question, out: Array) -> int:
     """What a kernel answers for two curves, or a curve and a point, that need no checks; -1 for anything else."""
     if type(a) is not NurbsCurve:
@@ -89,7 +106,7 @@ def quick_answer(a: Any, b: Any, question: Question, out: Array) -> int:
     if place is None or not question[3]:
         return -1
     record, pool = a._packed_pieces
-    code = int(point_distance(record, pool, place, question, out))
+    code = int(point_distance(record, pool, place, question, nearest_address(), out))
     return code if code != UNFINISHED else from_pairs(a, b, question, out)
 
 

@@ -47,9 +47,12 @@ class Ticks(TickMemory):
         """Run the loop, and prove where that led; None if the loop or the proof goes on in the next tick.
 
         Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses a pose,
-        they get the rows of the last one, once, and the tick begins again.
+        they get others, once, and the tick begins again. Pairs that had rows get those of the pose that was refused,
+        and the tick goes on from there: where a flat face turns to its other side, the lowest point of its rim is one
+        that it was not near before. If that does not hold either, and for pairs that had none, it begins at the last
+        pose, with the rows of that.
         """
-        begun_again = _NO_PAIRS
+        begun_again, goes_on = _NO_PAIRS, False
         clear = self._clear
         while True:
             if clear is not None:
@@ -58,19 +61,21 @@ class Ticks(TickMemory):
             if status is None:
                 # The next tick goes on from a pose that does not hold yet.
                 return None
-            ended = self._pose.copy()
-            if clear is None or status is TrackStatus.VIOLATED:
+            ended, is_violated = self._pose.copy(), status is TrackStatus.VIOLATED
+            if clear is None or (is_violated and not goes_on):
                 return status, ended
-            holds = clear.hold_at(Standing(self._scene, self._packed, ended), until, code)
+            holds = not is_violated and clear.hold_at(Standing(self._scene, self._packed, ended), until, code)
             if holds is None:
                 self._awaited = status, row, ended
                 return None
             if holds:
                 return status, self._holds() if self._rows.are_some else ended
-            again = self._rows.without_updates(clear.doubtful) & set(clear.in_the_way) - begun_again
-            if self._budget is not None or not again:
+            again = self._rows.without_updates(clear.doubtful) & set(clear.in_the_way)
+            if self._budget is not None or not (goes_on or again - begun_again):
                 return self._refused()
-            self._pose[:] = self._before
+            goes_on = not (goes_on or begun_again or again & self._rows.unlisted)
+            if not goes_on:
+                self._pose[:] = self._before
             self._rows.list_again(self._state, again, self._poses_of(ended))
             begun_again |= again
 

@@ -18,6 +18,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._lanes import lane
 from assembly._newton import damped_newton
@@ -46,6 +47,8 @@ from assembly.geometry.splines.evaluate import xyz
 from assembly.geometry.vec import sub
 
 _DEEPEST = 40
+# Length of the list of nodes that are still to be looked at.
+_STACK = 200
 # Intervals of a span that are tried before the query is left to `curve_distance`: near a parameter at which the curve
 # hardly moves, squares lose too many digits.
 _PATIENCE = 64
@@ -59,6 +62,8 @@ _NEAR_END = 1e-3
 PointQuery = namedtuple("PointQuery", "record pool p reach error away step clearance budget work")
 # The same on an interval of a span.
 SpanQuery = namedtuple("SpanQuery", "query span interval")
+_QUESTION = "Tuple((f8, f8, i8, b1))"
+_GIVEN = f"i8[::1], f8[::1], UniTuple(f8, 3), {_QUESTION}"
 
 
 @kernel(inner=True)
@@ -206,9 +211,13 @@ def point_query(record, pool, point, question, work):
     return PointQuery(record, pool, p, reach, error, away, step, question.clearance, question.budget, work)
 
 
-@kernel(inner=True, exact=True)
-def nearest_on_curve(record, pool, point, question, work, stack, out):
-    """Bounds of the distance of a point and a curve of degree 1 or more."""
+@kernel(signatures=f"({_GIVEN}, f8[::1], i8[::1], f8[::1])", exact=True)
+def nearest_on_curve(record, pool, point, asked, work, stack, out):
+    """Bounds of the distance of a point and a curve of degree 1 or more.
+
+    An entry that one point and many are given to by its address: compiled into both, they differed in their last bits.
+    """
+    question = Question(*asked)
     query = point_query(record, pool, point, question, work)
     p = query.p
     curve = bezier_curve_at(record, 0)
@@ -271,9 +280,12 @@ def work_for(record):
     return np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
 
 
-@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), Tuple((f8, f8, i8, b1)), f8[::1])", allocates=True)
-def point_distance(record, pool, point, asked, out):
-    """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
+@kernel(signatures=f"({_GIVEN}, i8, f8[::1])", allocates=True)
+def point_distance(record, pool, point, asked, nearest, out):
+    """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself.
+
+    `nearest` is the address of `nearest_on_curve`.
+    """
     question = Question(*asked)
     if question.clearance >= 0.0:
         # The box around the whole curve may already prove it apart.
@@ -287,14 +299,13 @@ def point_distance(record, pool, point, asked, out):
             write_answer(pool, far, upper, pool[bezier_curve_at(record, 0).breaks], e, point, out)
             curve_answer_at(out, 0).count = 1
             return APART
-    return nearest_on_curve(record, pool, point, question, work_for(record), np.empty(200, np.int64), out)
+    return call_address(nearest, (record, pool, point, asked, work_for(record), np.empty(_STACK, np.int64), out))
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])", allocates=True)
-def point_distances(record, pool, points, tolerance, budget, codes, out):
-    """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`."""
-    question = Question(tolerance, -1.0, budget, True)
-    work, stack = work_for(record), np.empty(200, np.int64)
+@kernel(signatures=f"(i8[::1], f8[::1], f8[:, ::1], {_QUESTION}, i8, i8[::1], f8[:, ::1])", allocates=True)
+def point_distances(record, pool, points, asked, nearest, codes, out):
+    """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`, without a clearance."""
+    work, stack = work_for(record), np.empty(_STACK, np.int64)
     for i in range(points.shape[0]):
         point = (points[i, 0], points[i, 1], points[i, 2])
-        codes[i] = nearest_on_curve(record, pool, point, question, work, stack, out[i])
+        codes[i] = call_address(nearest, (record, pool, point, asked, work, stack, out[i]))
