@@ -26,8 +26,12 @@ _BESIDE = (
 )  # fmt: skip
 
 
-# What OCCT looks for in each two edges of a wire, and in each two wires of a face.
-_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode", "FixOrientationMode")
+# What OCCT looks for in each two edges of a wire and in each two wires of a face, edges that run back along the one
+# before, and gaps between edges.
+_REPAIRS = (
+    "FixSelfIntersectionMode", "FixIntersectingWiresMode", "FixOrientationMode", "FixNotchedEdgesMode",
+    "FixLackingMode",
+)  # fmt: skip
 
 
 class StepError(InputError):
@@ -80,9 +84,10 @@ class Document(NamedTuple):
 def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> Document:
     """A file as a document of OCCT.
 
-    OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
-    repairs it does not: faces are checked when they are made of them. It repairs all that other files have, whatever it
-    is told, so those that refer to no others are read by themselves as well.
+    OCCT looks for wires that cross themselves or others, comparing each two of their edges, for edges that run back
+    along the one before and for gaps, and mends them. Without repairs it does not: faces are checked when they are made
+    of them. It repairs all that other files have, whatever it is told, so those that refer to no others are read by
+    themselves as well.
 
     OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
     end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
