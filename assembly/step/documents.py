@@ -26,8 +26,12 @@ _BESIDE = (
 )  # fmt: skip
 
 
-# What OCCT looks for in each two edges of a wire, and in each two wires of a face.
-_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode", "FixOrientationMode")
+# What OCCT looks for in each two edges of a wire and in each two wires of a face, edges that run back along the one
+# before, and gaps between edges.
+_REPAIRS = (
+    "FixSelfIntersectionMode", "FixIntersectingWiresMode", "FixOrientationMode", "FixNotchedEdgesMode",
+    "FixLackingMode",
+)  # fmt: skip
 
 
 class StepError(InputError):
@@ -80,9 +84,10 @@ class Document(NamedTuple):
 def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> Document:
     """A file as a document of OCCT.
 
-    OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
-    repairs it does not: faces are checked when they are made of them. It repairs all that other files have, whatever it
-    is told, so those that refer to no others are read by themselves as well.
+    OCCT looks for wires that cross themselves or others, comparing each two of their edges, for edges that run back
+    along the one before and for gaps, and mends them. Without repairs it does not: faces are checked when they are made
+    of them. It repairs all that other files have, whatever it is told, so those that refer to no others are read by
+    themselves as well.
 
     OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
     end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
@@ -186,26 +191,25 @@ def _counted(reader: Any) -> tuple[int, int, int]:
     OCCT does not read those of style if it is told to make no colors.
     """
     o, model = occt(), reader.Reader().WS().Model()
+    entities = model.Entities()
     broken: list[str] = []
     if model.Reports().NbEntities():
         everything = range(1, model.NbEntities() + 1)
         broken = [type(model.Value(k)).__name__ for k in filter(model.IsErrorEntity, everything)]
         broken = [kind for kind in broken if not _is_beside(kind)]
     styles = sum(kind.startswith("StepVisual_") for kind in broken)
-    flat = sum(map(_is_flat, _entities(_of_kind(model, o.StepGeom_Axis2Placement3d))))
-    bare = sum(map(_is_bare, _entities(_of_kind(model, o.StepGeom_Pcurve))))
-    faces = _of_kind(model, o.StepShape_FaceSurface).NbEntities()
+    flat = sum(map(_is_flat, _each(_of_kind(entities, o.StepGeom_Axis2Placement3d))))
+    bare = sum(map(_is_bare, _each(_of_kind(entities, o.StepGeom_Pcurve))))
+    faces = _of_kind(entities, o.StepShape_FaceSurface).NbEntities()
     return len(broken) - styles + flat + bare, styles, faces
 
 
-def _of_kind(model: Any, kind: Any) -> Any:
-    """OCCT's list of the entities of a kind; it chooses among thousands without an object of Python for each."""
-    chosen = model.Entities()
-    chosen.SelectType(kind.get_type_descriptor_s(), True)
-    return chosen
+def _of_kind(entities: Any, kind: Any) -> Any:
+    """Those of OCCT's list that are of a kind; it chooses among thousands without an object of Python for each."""
+    return entities.Typed(kind.get_type_descriptor_s())
 
 
-def _entities(chosen: Any) -> Iterator[Any]:
+def _each(chosen: Any) -> Iterator[Any]:
     """The entities of a list of OCCT."""
     chosen.Start()
     while chosen.More():

@@ -88,6 +88,12 @@ class Edges:
                 self._known[number] = known
         return known
 
+    def known_of(self, wire: Wire) -> list[Known]:
+        """What is known of the edges of a wire."""
+        if not wire.known:
+            wire.known = [self.known(traced.edge) for traced in wire.edges]
+        return wire.known
+
     def forgiven(self, tolerance: float, size: float) -> float:
         """A tolerance on a face of a size: at most a share of that or of the part's, whichever is larger."""
         if tolerance <= _FORGIVEN * size:

@@ -131,7 +131,9 @@ class _Draft:
         if outer is None and not holes:
             # The edge of a surface that is damaged may bound no face, which is otherwise found when it is asked for.
             _ = made.boundary
-        self.read = Read(made, self.deviation, self.gap, outer is not None and _is_clockwise(outer))
+        # A face turns loops that run clockwise, and those that are its boundary as they are it has not turned.
+        is_kept = outer is None or bool(made.boundary) and made.boundary[0] is outer[0]
+        self.read = Read(made, self.deviation, self.gap, not is_kept and outer is not None and _is_clockwise(outer))
 
 
 def _is_clockwise(loop: list[NurbsCurve]) -> bool:

@@ -35,6 +35,8 @@ def placement_of(location: Any, scale: float = 1.0) -> tuple[Pose, float]:
     Unreadable
         The location shears, or scales by nothing.
     """
+    if location.IsIdentity():
+        return Pose(), 1.0
     transform = location.Transformation()
     rows = np.array([[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)])
     factor = float(np.cbrt(np.linalg.det(rows[:, :3])))

@@ -28,16 +28,8 @@ from assembly.geometry.splines.curve_parts import CORNER
 from assembly.step.occt import occt
 
 __all__ = [
-    "Direction",
-    "Spline",
-    "Straight",
-    "Turning",
-    "Unreadable",
-    "approximated",
-    "arc",
-    "profile",
-    "spline",
-]
+    "Direction", "Spline", "Straight", "Turning", "Unreadable", "approximated", "arc", "profile", "spline", "values_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 # Part of the extent by which surfaces reach beyond their face, so that trims lie inside their domain.
@@ -69,8 +61,11 @@ class Spline:
 
 def spline(points: Array, knots: Array, degree: int, weights: Array | None = None) -> Spline:
     """A spline of control points (n, d)."""
-    w = np.ones(len(points)) if weights is None else weights
-    return Spline(np.concatenate([points * w[:, None], w[:, None]], axis=1), knots, degree)
+    made = np.ones((len(points), points.shape[1] + 1))
+    made[:, :-1] = points
+    if weights is not None:
+        made *= weights[:, None]
+    return Spline(made, knots, degree)
 
 
 @dataclass(frozen=True)
@@ -321,7 +316,7 @@ def _cut_spline(curve: Any, low: float, high: float) -> Any:
 
 
 def _conic_axes(curve: Any) -> tuple[Array, Array, Array, float]:
-    """Center, the two half-axes as vectors, and a mean radius, of a circle or an ellipse."""
+    """Center, the two half-axes as vectors, and a mean radius, of a circle, an ellipse or a hyperbola."""
     position = curve.Position()
     x, y = point(position.XDirection()), point(position.YDirection())
     if isinstance(curve, (occt().Geom_Circle, occt().Geom2d_Circle)):
@@ -387,8 +382,15 @@ def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, 
         net = point(place.Location()) + squares[:, None] * x + ways[:, None] * y
         return spline(net, np.repeat([a, b], 3), 2), Straight(True), 0.0
     # Hyperbolas, offsets: nothing but their smoothness is used.
-    size = max(1e-300, float(np.abs(point(curve.Value(low)) - point(curve.Value(high))).max()))
-    made, error = approximated(
-        lambda t: np.array([point(curve.Value(float(x))) for x in t]), np.linspace(low, high, 9), 1e-9 * size
-    )
+    values = values_of(curve)
+    size = max(1e-300, float(np.abs(np.subtract(*values(np.array([low, high])))).max()))
+    made, error = approximated(values, np.linspace(low, high, 9), 1e-9 * size)
     return made, Straight(False), error
+
+
+def values_of(curve: Any) -> Callable[[Array], Array]:
+    """Points of any curve of OCCT at its parameters: of a hyperbola without asking for each."""
+    if isinstance(curve, (occt().Geom_Hyperbola, occt().Geom2d_Hyperbola)):
+        center, x, y, _ = _conic_axes(curve)
+        return lambda t: center + np.cosh(t)[:, None] * x + np.sinh(t)[:, None] * y
+    return lambda t: np.array([curve.Value(each).Coord() for each in t.tolist()])

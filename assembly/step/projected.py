@@ -22,7 +22,7 @@ from assembly.errors import InputError
 from assembly.step.crossings import crossings
 from assembly.step.edge_feet import AT_POLE, distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import occt
-from assembly.step.profiles import Direction, Spline, Unreadable, approximated, knot_row, point, profile
+from assembly.step.profiles import Direction, Spline, Unreadable, approximated, knot_row, profile, values_of
 from assembly.step.surfaces import CONFUSION, Patch
 from assembly.step.tracks import Track, track
 
@@ -48,7 +48,7 @@ def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
             pass
         else:
             return _tracked(curve, source, along)
-    return _asked(curve)
+    return values_of(curve)
 
 
 def is_exact(curve: Any) -> bool:
@@ -60,11 +60,7 @@ def is_exact(curve: Any) -> bool:
 
 
 def _tracked(curve: Any, source: Spline, along: Direction) -> Callable[[Array], Array]:
-    return track(source, along) or _asked(curve)
-
-
-def _asked(curve: Any) -> Callable[[Array], Array]:
-    return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
+    return track(source, along) or values_of(curve)
 
 
 class Space(NamedTuple):
@@ -123,7 +119,7 @@ class Side:
 
     @cached_property
     def _points(self) -> Callable[[Array], Array]:
-        made = _asked(self._flat[0])
+        made = values_of(self._flat[0])
         if is_exact(self._flat[0]):
             with suppress(Unreadable, InputError):
                 source, along, _ = self.profile

@@ -224,11 +224,10 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
     rows: list[tuple[float, ...]] = []
     curves: list[Spline | None] = []
     names = []
-    known_of, forgiven = edges.known, edges.forgiven
+    forgiven = edges.forgiven
     is_point = occt().BRep_Tool.Degenerated_s if patch.surface._pole_bits else None
-    for traced in wire.edges:
+    for traced, known in zip(wire.edges, edges.known_of(wire), strict=True):
         edge, _, low, high, line, seam = traced
-        known = known_of(edge)
         tolerance, is_turned = forgiven(known.tolerance, size), edge.Orientation() == turned
         if line is None or known.loose:
             draft, known = _best(traced, known, wire, patch, edges)
@@ -261,8 +260,8 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
 
 def ready_edges(wire: Wire, patch: Patch, edges: Edges) -> None:
     """Have what loose edges of a wire are compared with at hand: their curves in space, and those on the surface."""
-    for traced in wire.edges:
-        if edges.known(traced.edge).loose and traced.curve is not None and not traced.seam:
+    for traced, known in zip(wire.edges, edges.known_of(wire), strict=True):
+        if known.loose and traced.curve is not None and not traced.seam:
             if edges.space(traced.edge) is not None:
                 edges.side(traced, wire.face, patch).ready()
 

@@ -6,11 +6,14 @@ for again. Of wires of straight lines it is that of their ends.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assembly.step.occt import occt, parts
+
+if TYPE_CHECKING:
+    from assembly.step.edges import Known
 
 __all__ = ["Box", "Pair", "Traced", "Wire", "bounds", "outermost", "wires_of"]
 
@@ -60,6 +63,8 @@ class Wire:
         Whether the wire has no others.
     is_outer : bool, optional
         Whether it is around the face, where that is known.
+    known : list of edges.Known
+        What is known of its edges, once that was asked.
     """
 
     wire: Any
@@ -68,6 +73,7 @@ class Wire:
     ordered: bool
     whole: bool
     is_outer: bool | None = None
+    known: list[Known] = field(default_factory=list)
 
     @cached_property
     def box(self) -> Box:

@@ -15,7 +15,7 @@ from assembly.step.carriers import spline_curve
 from assembly.step.crossings import crossings
 from assembly.step.edge_feet import distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import quiet, settings
-from assembly.step.profiles import approximated, point
+from assembly.step.profiles import approximated, point, values_of
 from assembly.step.projected import Side, is_loose, points_of, projected, space_of
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, cylinder, edges, faces, parts, without
@@ -275,3 +275,13 @@ def test_curves_that_occt_makes_beside_poles(tmp_path, off):
     across = (apart**2 + 25.0 - 4.0) / (2.0 * apart)
     caps = [pi / 3.0 * h**2 * (3.0 * r - h) for h, r in ((5.0 - across, 5.0), (2.0 - (apart - across), 2.0))]
     assert body.volume == pytest.approx(4.0 / 3.0 * pi * 125.0 - sum(caps), rel=1e-9)
+
+
+def test_points_of_hyperbolas_are_those_of_occt():
+    """In space and in the plane, without asking OCCT for each."""
+    t = np.linspace(-1.5, 2.0, 30)
+    axes = O.gp_Ax2(O.gp_Pnt(1.0, 2.0, 3.0), O.gp_Dir(0.3, -0.4, 0.8), O.gp_Dir(1.0, 2.0, 0.2))
+    flat = O.gp_Ax2d(O.gp_Pnt2d(1.0, -2.0), O.gp_Dir2d(0.6, 0.8))
+    for curve in (O.Geom_Hyperbola(axes, 4.0, 1.5), O.Geom2d_Hyperbola(flat, 4.0, 1.5, False)):
+        wanted = np.array([point(curve.Value(x)) for x in t.tolist()])
+        assert np.abs(values_of(curve)(t) - wanted).max() < 1e-14 * np.abs(wanted).max()

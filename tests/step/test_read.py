@@ -358,6 +358,9 @@ def wedge_center():
 
 def test_placements_without_volume_are_refused():
     class Flat:
+        def IsIdentity(self):
+            return False
+
         def Transformation(self):
             return self
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_parts import sampled
 from assembly.geometry.splines.surface import NurbsSurface
 
 __all__ = ["clipped", "extent", "rates", "widened"]
@@ -23,21 +24,27 @@ Array = NDArray[np.float64]
 _REFINED = 16
 # Places along an edge at which the surface is looked at.
 _PLACES = 9
+# Samples of a stretch of a curve, and steps of Newton's method from them: errors are squared, from a 64th of a stretch.
+_SAMPLES, _STEPS = 65, 4
+# Signs by which a least and a largest coordinate are both least.
+_DOWNHILL = np.array([1.0, -1.0])
 
 
 def extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
-    """Least and largest coordinate of a curve itself, by refined samples."""
-    at = curve.breaks()
-    t = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in zip(at[:-1], at[1:], strict=True)]))
-    result = []
-    for sign in (1.0, -1.0):
-        grid = t
-        for _ in range(6):
-            values = sign * curve.evaluate(grid)[:, axis]
-            k = int(np.argmin(values))
-            grid = np.linspace(grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)], 65)
-        result.append(sign * float((sign * curve.evaluate(grid)[:, axis]).min()))
-    return result[0], result[1]
+    """Least and largest coordinate of a curve itself, by Newton's method from samples, between their neighbors."""
+    grid = sampled(curve.breaks(), _SAMPLES)
+    values = curve.evaluate(grid)[:, axis]
+    k = np.array([values.argmin(), values.argmax()])
+    t, low, high = grid[k], grid[np.maximum(k - 1, 0)], grid[np.minimum(k + 1, grid.size - 1)]
+    least, most = values[k].tolist()
+    for _ in range(_STEPS):
+        first, second = (row[:, axis] * _DOWNHILL for row in curve.evaluate(t, 2)[1:])
+        low, high = np.where(first > 0.0, low, t), np.where(first > 0.0, t, high)
+        ahead = t - np.divide(first, second, out=np.zeros(2), where=second > 0.0)
+        t = np.where((second > 0.0) & (ahead >= low) & (ahead <= high), ahead, 0.5 * (low + high))
+        a, b = curve.evaluate(t)[:, axis].tolist()
+        least, most = min(least, a), max(most, b)
+    return least, most
 
 
 def rates(surface: NurbsSurface) -> Array:

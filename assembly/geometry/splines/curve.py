@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import isfinite
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -179,7 +180,9 @@ class NurbsCurve(FoundAgain, ReadOnlyArrays):
         names : of each
         """
         knots = np.repeat(np.array(intervals, dtype=np.float64).reshape(-1, 2), 2, axis=1)
-        if not (np.isfinite(ends).all() and np.isfinite(knots).all() and all(low < high for low, high in intervals)):
+        # A sum may overflow: that is seen where all is checked.
+        is_finite = isfinite(sum(ends.ravel().tolist()) + sum(map(sum, intervals)))
+        if not (is_finite and all(low < high for low, high in intervals)):
             return [cls(row, turn, 1, name=name) for row, turn, name in zip(ends, knots, names, strict=True)]
         points = np.array(ends, dtype=np.float64, order="C")
         points.flags.writeable = knots.flags.writeable = False
