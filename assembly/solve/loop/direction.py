@@ -64,11 +64,14 @@ def find_direction(program, current, rows, system, trust, restoring, tick):
     if shift < 0.0:
         return shift, shift, 0.0, 0.0
     used, longest, turn = damped_step(program, system, Trust(shift, trust.radius, trust.damps))
+    fewest = rows.count + 1
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
-        if predict_active_set(program, current, rows, system) == 0:
+        wrong = predict_active_set(program, current, rows, system, fewest)
+        if wrong == 0:
             break
+        fewest = min(fewest, wrong)
         if attempt == FORESEEN:
             leave_out(shape, current, rows, system)
         hold_ends(system)

@@ -67,24 +67,36 @@ def let_pushing_count(program, point, rows, system):
             let_count(shape, r, True, point, rows, system)
 
 
-@kernel(inner=True)
-def predict_active_set(program, point, rows, system):
-    """Make one-sided rows active that are idle here and would push at the end of the step, and others inactive.
+@kernel(inline=True)
+def is_foreseen_wrong(program, point, rows, system, r):
+    """Whether row r, one-sided and idle here, would push at the end of the step and is not foreseen to, or other way.
 
-    Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
+    The sign is that of y + (c + J step) / mu.
     """
-    shape, step, foreseen = program.structure, system.directions.step, rows.foreseen
-    changed = 0
+    shape, foreseen = program.structure, rows.foreseen[r] == 1.0
+    if shape.one_sided[r] == 0 or (rows.active[r] > 0.0 and not foreseen) or is_trim(program.store.table, r):
+        return False
+    there = point.residual[r] + times(shape.bases, point.jacobian, r, system.directions.step)
+    return (rows.y[r] + there / rows.mu < 0.0) != foreseen
+
+
+@kernel(inner=True)
+def predict_active_set(program, point, rows, system, fewest):
+    """Foresee rows that are idle here and would push at the end of the step, and no longer those that would not.
+
+    Returns how many were wrong. If `fewest` or more were, the first of them alone changes: all of them at once may
+    change places for ever where rows depend on each other, one at a time in a fixed order agree in the end, because the
+    matrix is positive (Murty's least-index method for linear complementarity).
+    """
+    wrong = 0
     for r in range(rows.count):
-        if shape.one_sided[r] == 0 or (rows.active[r] > 0.0 and foreseen[r] == 0.0):
-            continue
-        if is_trim(program.store.table, r):
-            continue
-        pushes = rows.y[r] + (point.residual[r] + times(shape.bases, point.jacobian, r, step)) / rows.mu < 0.0
-        if pushes != (foreseen[r] == 1.0):
-            changed += 1
-            let_count(shape, r, pushes, point, rows, system)
-    return changed
+        wrong += 1 if is_foreseen_wrong(program, point, rows, system, r) else 0
+    left = wrong if wrong < fewest else 1
+    for r in range(rows.count):
+        if left > 0 and is_foreseen_wrong(program, point, rows, system, r):
+            let_count(program.structure, r, rows.foreseen[r] == 0.0, point, rows, system)
+            left -= 1
+    return wrong
 
 
 @kernel(inner=True)

@@ -48,10 +48,10 @@ SHIFT, TINIEST_SHIFT = 1e-2, 1e-13
 # [length] Rows are close to holding where they are off by less: there the shift above counts, and rows that depend on
 # each other gain nothing any more. Doubled: the shift falls sooner. From: `LEAST_SHIFT` over `SHIFT`.
 NEARLY_HELD = 1e-6
-# [rounds] A step is computed so often for one-sided rows that it would break. Where they change places for ever, it is
-# the one without them: half of an exchange may lead uphill. Doubled: a little time where rows change places.
-# From: random rows, of which some take more than four rounds and a few in a hundred never agree.
-FORESEEN = 12
+# [rounds] A step is computed so often for one-sided rows that it would break. Where they do not agree by then, it is
+# the one without them: half of an exchange may lead uphill. Doubled: time where many rows depend on each other.
+# From: random rows, 20 of rank 3 at a time, of which one in a hundred takes more than 40.
+FORESEEN = 60
 # [steps] After so many feasible steps in a row that motion bounds cut by more than half, steps are damped, until one is
 # cut less: they may be long in directions that no row and no objective resists, as a ring's spin about its own axis.
 # Doubled: twice as many short steps. Chosen.
