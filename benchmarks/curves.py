@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from assembly import NurbsCurve
 from assembly.distance.curves.capsules import capsule_tree
 from assembly.distance.curves.search import ANSWER
+from assembly.distance.spline_queries import nearest_address
 from assembly.proximity import collides, is_separated, minimum_distance, minimum_distances
 from benchmarks.figures import figure
 from benchmarks.query_kernels import point_question_often, question_often, subdivide, subdivide_often
@@ -156,7 +157,7 @@ def _points(degree: int, curves: int, repeats: int) -> list[dict[str, Any]]:
         none, half, zero = np.full(count, -1.0), 0.5 * lower, np.zeros(count)
         tree = capsule_tree(record, pool)
         for series, clearance in ((distance, none), (clear, half), (collide, zero)):
-            call = partial(point_question_often, record, pool, tree, points, clearance, 1, out)
+            call = partial(point_question_often, record, pool, tree, points, clearance, nearest_address(), out)
             series.append(_seconds(call, repeats) / count)
         plain.append(_seconds(partial(subdivide_often, squares, 1, stack), repeats) / count)
         batch.append(_seconds(partial(minimum_distances, points, curve), repeats) / count)

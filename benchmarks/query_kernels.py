@@ -59,14 +59,13 @@ def question_often(ra, qa, a, rb, qb, b, clearance, plane, times, out):
 
 
 @kernel
-def point_question_often(record, pool, tree, points, clearance, times, out):
-    """The same of points."""
-    for _ in range(times):
-        for i in range(points.shape[0]):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            if clearance[i] < 0.0 or compare_point(tree, x, y, z, clearance[i]) == OPEN:
-                asked = (1e-10, clearance[i], np.int64(1_000_000), np.bool_(True))
-                point_distance(record, pool, (x, y, z), asked, out)
+def point_question_often(record, pool, tree, points, clearance, nearest, out):
+    """The same of points; `nearest` is the address of `nearest_on_curve`."""
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if clearance[i] < 0.0 or compare_point(tree, x, y, z, clearance[i]) == OPEN:
+            asked = (1e-10, clearance[i], np.int64(1_000_000), np.bool_(True))
+            point_distance(record, pool, (x, y, z), asked, nearest, out)
 
 
 @kernel

@@ -18,7 +18,16 @@ from assembly.solve.loop.multipliers import (
     predict_active_set,
     weigh_rows,
 )
-from assembly.solve.loop.parameters import FORESEEN, KICK, LEAST_SHIFT, NEARLY_HELD, SADDLE, SHIFT, TINIEST_SHIFT
+from assembly.solve.loop.parameters import (
+    FORESEEN,
+    FORESEEN_IN_TICKS,
+    KICK,
+    LEAST_SHIFT,
+    NEARLY_HELD,
+    SADDLE,
+    SHIFT,
+    TINIEST_SHIFT,
+)
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
 
@@ -64,15 +73,16 @@ def find_direction(program, current, rows, system, trust, restoring, tick):
     if shift < 0.0:
         return shift, shift, 0.0, 0.0
     used, longest, turn = damped_step(program, system, Trust(shift, trust.radius, trust.damps))
-    fewest = rows.count + 1
-    for attempt in range(FORESEEN + 1):
+    fewest, rounds = rows.count + 1, FORESEEN_IN_TICKS if tick else FORESEEN
+    for attempt in range(rounds + 1):
         if used < 0.0 or restoring:
             break
         wrong = predict_active_set(program, current, rows, system, fewest)
         if wrong == 0:
             break
-        fewest = min(fewest, wrong)
-        if attempt == FORESEEN:
+        if not tick:
+            fewest = min(fewest, wrong)
+        if attempt == rounds:
             leave_out(shape, current, rows, system)
         hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
