@@ -227,7 +227,7 @@ def _with_pockets(faces: tuple[Face, ...]) -> BodyHulls | None:
         if bent is not None:
             is_more = True
             by_face[number] = [
-                part._replace(hollows=[*part.hollows, *bent.pockets], hulls=[*part.hulls, bent.hull])
+                part._replace(hollows=[*part.hollows, *bent.pockets], hulls=[*part.hulls, *bent.hulls])
                 for part in by_face[number]
             ]
     return _joined(by_face) if is_more else None

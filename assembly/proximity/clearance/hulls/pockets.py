@@ -1,5 +1,7 @@
 """Pockets and bores that cut into a cylinder: convex sets that end at its axis, into which the rest of it does not go.
 
+Also hulls of bores that end in the wall of a cylinder: no farther out than that.
+
 Straight up along a direction d across the axis, or one that leans, the side of a cylinder whose outward normals lead
 along d is met once by every line. So what of it is above a convex set, there, is one connected part of the cylinder. If
 no curve of the face's boundary is within the set, and one point of that part is none of the face, no point of it is.
@@ -35,8 +37,6 @@ ALONG = 1e-9
 LOW = 1e-6
 # [radii] How far from its axis a bore that leads through a cylinder is, at most.
 BESIDE = 0.999
-# What control points are off, in parts of the largest coordinate.
-ROUNDING = 1e-13
 # In how many parts a curve of the boundary is, at least.
 PARTS = 16
 # Holes of a face that are asked, at most.
@@ -44,9 +44,13 @@ MOST = 12
 
 
 class _Curve(NamedTuple):
-    """A curve of a face's boundary in space, in parts: homogeneous control points (n + 1, m, 4), an array a degree."""
+    """A curve of a face's boundary in space, in parts: homogeneous control points (n + 1, m, 4), an array a degree.
+
+    It may be off by `error`.
+    """
 
     nets: list[Array]
+    error: float
 
     @property
     def points(self) -> Array:
@@ -58,18 +62,17 @@ class _Curve(NamedTuple):
         """The points (k, 3) in which parts begin and end."""
         return np.concatenate([(net[k, :, :3] / net[k, :, 3:]) for net in self.nets for k in (0, -1)])
 
-    def least_from(self, point: Array, axis: Array) -> float:
-        """How far it is from an axis, at least: squared distances are between their Bernstein coefficients."""
+    def between(self, point: Array, axis: Array) -> tuple[float, float]:
+        """How far it is from an axis, at least and at most: squares are between their Bernstein coefficients."""
         across = np.linalg.svd(axis[None])[2][1:]
-        least = np.inf
+        found = []
         for net in self.nets:
-            off = (net[..., :3] - net[..., 3:] * point) @ across.T
-            beside, weights = np.moveaxis(off, (1, 2), (0, 1)), net[None, ..., 3].swapaxes(0, 2).swapaxes(1, 2)
-            squares = bezier_dot(beside[..., None], beside[..., None]) / bezier_dot(
-                weights[..., None], weights[..., None]
-            )
-            least = min(least, float(squares.min()))
-        return float(np.sqrt(max(least, 0.0)))
+            beside = np.moveaxis((net[..., :3] - net[..., 3:] * point) @ across.T, 0, 2)[..., None]
+            weights = net[..., 3].T[:, None, :, None]
+            found.append((bezier_dot(beside, beside) / bezier_dot(weights, weights)).ravel())
+        squares = np.concatenate(found)
+        least, most = (float(np.sqrt(max(value, 0.0))) for value in (squares.min(), squares.max()))
+        return least - self.error, most + self.error
 
 
 class _Wall(NamedTuple):
@@ -84,13 +87,13 @@ class Bent(NamedTuple):
 
     Attributes
     ----------
-    hull : (Discs, float)
-        Every line of the cylinder is in the face from boundary to boundary, and so in the hull of that; with a pad.
+    hulls : list of (Discs, float)
+        At most one, with a pad.
     pockets : list of Prism
         Convex sets in its holes, above its axis.
     """
 
-    hull: tuple[Discs, float]
+    hulls: list[tuple[Discs, float]]
     pockets: list[Prism]
 
 
@@ -99,18 +102,33 @@ def bent_wall(face: Face, form: Form, walls: list[Form]) -> Bent | None:
     if not isinstance(form, Cylinder) or face.outer is None or len(face.chains) > MOST:
         return None
     is_along = [any(np.ptp(curve.control_points[:, k]) == 0.0 for k in (0, 1)) for curve in face.boundary]
-    if all(is_along[k] for k in face.chains[0]) and all(
-        len(chain) == 1 and is_along[chain[0]] for chain in face.chains[1:]
-    ):
+    if all(is_along) and all(len(chain) == 1 for chain in face.chains[1:]):
         # Its ends say as much.
         return None
     curves = _curves_of(face)
-    points = np.concatenate([curve.points for curve in curves])
-    pad = 2.0 * form.deviation + ROUNDING * float(np.abs(points).max())
-    return Bent((Discs.of_points(points), pad), _pockets(face, form, walls, curves))
+    hulls, found = _hulls(form, walls, curves), _pockets(face, form, walls, curves)
+    return Bent(hulls, found) if hulls or found else None
+
+
+def _hulls(form: Cylinder, walls: list[Form], curves: list[_Curve]) -> list[tuple[Discs, float]]:
+    """The narrowest cylinder of another face that a boundary is in, and so all lines from there to there."""
+    best: tuple[Discs, float] | None = None
+    for wall in walls:
+        if not isinstance(wall, Cylinder) or (best is not None and wall.radius >= best[0].radii[0]):
+            continue
+        heights = np.concatenate([(curve.points - wall.point) @ wall.axis for curve in curves])
+        beyond = max(wall.heights[0] - heights.min(), heights.max() - wall.heights[1])
+        beyond = max(beyond, max(curve.between(wall.point, wall.axis)[1] for curve in curves) - wall.radius, 0.0)
+        if beyond > NEARLY * wall.radius:
+            continue
+        centers = wall.point + np.array(wall.heights)[:, None] * wall.axis
+        pad = beyond + max(curve.error for curve in curves) + 2.0 * form.deviation
+        best = Discs(centers, np.tile(wall.axis, (2, 1)), np.full(2, wall.radius)), pad
+    return [] if best is None else [best]
 
 
 def _pockets(face: Face, form: Cylinder, walls: list[Form], curves: list[_Curve]) -> list[Prism]:
+    """Convex sets of the pockets in a cylinder, above its axis."""
     off = NEARLY * float(face.surface.size)
     found = []
     for chain in face.chains[1:]:
@@ -139,15 +157,17 @@ def _through(form: Cylinder, found: list[Prism]) -> list[Prism]:
 def _curves_of(face: Face) -> list[_Curve]:
     """The curves of a face's boundary in space, in some parts at least."""
     found: list[dict[int, list[Array]]] = [{} for _ in face.boundary]
+    errors = np.zeros(len(face.boundary))
     for block in boundary_patches(face, patches_of(face, 0, np.zeros(3))):
         net = block.nets[0, :, 0]
         found[block.curve].setdefault(len(net), []).append(net)
+        errors[block.curve] = max(errors[block.curve], block.error)
     curves = []
-    for of_degrees in found:
+    for of_degrees, error in zip(found, errors.tolist(), strict=True):
         nets = [np.stack(parts, axis=1) for parts in of_degrees.values()]
         while sum(net.shape[1] for net in nets) < PARTS:
             nets = [np.concatenate(bezier.divided(net, 0.5), axis=1) for net in nets]
-        curves.append(_Curve(nets))
+        curves.append(_Curve(nets, error))
     return curves
 
 
@@ -195,7 +215,7 @@ def _pocket(form: Cylinder, walls: list[_Wall]) -> Prism | None:
     for wall in walls:
         if isinstance(wall.form, Plane):
             inward.append(wall.form.normal * np.sign((middle - wall.form.point) @ wall.form.normal))
-            borders.append(float((wall.curve.points @ inward[-1]).max()))
+            borders.append(float((wall.curve.points @ inward[-1]).max()) + wall.curve.error)
         else:
             rounds.append(_arc(wall.form, wall.curve, along, is_bore))
     arcs = Arcs(*(np.array(column) for column in zip(*rounds, strict=True))) if rounds else NO_ARCS
@@ -204,7 +224,7 @@ def _pocket(form: Cylinder, walls: list[_Wall]) -> Prism | None:
 
 def _arc(bore: Cylinder, curve: _Curve, along: Array, is_whole: bool) -> tuple[Array, Array, float, float]:
     """An arc that a curve on a bore is not within: center, direction of its middle, radius, and half of its angle."""
-    radius = curve.least_from(bore.point, along)
+    radius = curve.between(bore.point, along)[0]
     off = curve.points - bore.point
     off -= (off @ along)[:, None] * along
     middle = off.mean(axis=0)
@@ -233,7 +253,7 @@ def _is_beyond(pocket: Prism, curve: _Curve) -> bool:
     """Whether of every part of a curve one half space of a pocket has nothing within."""
     inward, borders = pocket.planes(curve.ends.mean(axis=0))
     for net in curve.nets:
-        away = np.all((net[..., :3] / net[..., 3:]) @ inward.T <= borders, axis=0)
+        away = np.all((net[..., :3] / net[..., 3:]) @ inward.T <= borders - curve.error, axis=0)
         if not away.any(axis=1).all():
             return False
     return True

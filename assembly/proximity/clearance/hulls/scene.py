@@ -179,6 +179,9 @@ class HullAnswers:
         return answer_by_hulls(first.facing(second), posed, float(self._minimum[k]), self._touching)
 
     def _answer_by_pockets(self, k: int) -> Answer | None:
+        self._crossings[k] = self._ask_whether_it_crosses(k)
+        if self._crossings[k] is not None:
+            return None
         found = [with_pockets(self._shapes[body]) for body in self._pairs[k]]
         if found == [None, None]:
             return None
