@@ -53,7 +53,8 @@ NEARLY_HELD = 1e-6
 # From: random rows, 20 of rank 3 at a time, of which one in a hundred takes more than 40.
 FORESEEN = 60
 # [rounds] The same in ticks, in which all that are wrong change at once: with rows that agree, plates that are dragged
-# over each other and a plug that leans in its seat are led less near to the hand. From: the same, four rounds and more.
+# over each other and a plug that leans in its seat are led less near to the hand. Doubled: a little time where rows
+# change places. From: random rows, of which some take more than four rounds and a few in a hundred never agree.
 FORESEEN_IN_TICKS = 12
 # [steps] After so many feasible steps in a row that motion bounds cut by more than half, steps are damped, until one is
 # cut less: they may be long in directions that no row and no objective resists, as a ring's spin about its own axis.
