@@ -106,6 +106,8 @@ def bent_wall(face: Face, form: Form, walls: list[Form]) -> Bent | None:
         # Its ends say as much.
         return None
     curves = _curves_of(face)
+    if not curves:
+        return None
     hulls, found = _hulls(form, walls, curves), _pockets(face, form, walls, curves)
     return Bent(hulls, found) if hulls or found else None
 
@@ -155,13 +157,15 @@ def _through(form: Cylinder, found: list[Prism]) -> list[Prism]:
 
 
 def _curves_of(face: Face) -> list[_Curve]:
-    """The curves of a face's boundary in space, in some parts at least."""
+    """The curves of a face's boundary in space, in some parts at least; none if one of them is a point."""
     found: list[dict[int, list[Array]]] = [{} for _ in face.boundary]
     errors = np.zeros(len(face.boundary))
     for block in boundary_patches(face, patches_of(face, 0, np.zeros(3))):
         net = block.nets[0, :, 0]
         found[block.curve].setdefault(len(net), []).append(net)
         errors[block.curve] = max(errors[block.curve], block.error)
+    if not all(found):
+        return []
     curves = []
     for of_degrees, error in zip(found, errors.tolist(), strict=True):
         nets = [np.stack(parts, axis=1) for parts in of_degrees.values()]
@@ -207,9 +211,9 @@ def _pocket(form: Cylinder, walls: list[_Wall]) -> Prism | None:
     leaning += [float(np.linalg.norm(np.cross(axis, along))) for axis in axes]
     if max(leaning) > ALONG:
         return None
-    # The edges that lie on walls are beyond these.
     # Not quite at the axis, where outward normals no longer lead along the direction.
     inward, borders = [up], [float(up @ form.point) + LOW * form.radius]
+    # The edges that lie on walls are beyond these.
     is_bore = not normals and all(wall.form is walls[0].form for wall in walls)
     rounds = []
     for wall in walls:

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.hulls import pockets
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body, with_pockets
 from assembly.proximity.clearance.hulls.prism import Prism
 from assembly.proximity.clearance.hulls.scene import HullAnswers
@@ -187,6 +188,18 @@ def test_a_bore_across_a_shaft_reaches_no_farther_than_that():
     tube = turned_part([(RADIUS + 0.02, -50), (20, -50), (20, 50), (RADIUS + 0.02, 50)])
     told = answer(tube, shaft, at(0, 0, 3.0))
     assert told is not None and told.verdict is Verdict.CLEAR
+
+
+def test_of_a_boundary_with_a_point_in_it_nothing_is_told(monkeypatch):
+    """A curve that is a point is in no parts, however often these are halved."""
+    whole = pockets.boundary_patches
+    shaft = faces_of(bored_shaft(2.5, -7.0))
+
+    def without_one(face, patches):
+        return (block for block in whole(face, patches) if block.curve != 1)
+
+    monkeypatch.setattr(pockets, "boundary_patches", without_one)
+    assert with_pockets(shaft) is None
 
 
 def test_what_is_no_pocket_is_none():
