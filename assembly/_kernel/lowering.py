@@ -122,6 +122,7 @@ def _short_call(function: Any, libraries: Any, numba_calls: Callable[..., Any]) 
         value = context.get_returned_value(builder, function.restype, builder.load(place))
         return impl_ret_new_ref(context, builder, function.restype, value)
 
+    # Numba reads these of whatever writes a call; mypy knows of no attributes of functions.
     write.signature, write.libs = call.signature, call.libs  # type: ignore[attr-defined]
     return write
 
